@@ -1,0 +1,43 @@
+//! The one door between a node and its CAN controller.
+
+use core::fmt;
+
+use crate::frame::CanFrame;
+
+/// A CAN controller with its queues: built-in bus, vcan, serial adapter or silicon.
+///
+/// No call blocks, and none reads a clock. Tracing and fault injection are wrappers that implement this trait again.
+pub trait Bus {
+    /// The oldest frame received and not yet taken, or `None`. A node's own frames are not received.
+    fn receive(&mut self) -> Option<CanFrame>;
+
+    /// Puts a frame into the transmit queue.
+    ///
+    /// `Ok` says that the controller took the frame, not that any node received it: CAN tells a sender only that
+    /// *somebody* acknowledged. Liveness is therefore always judged from frames received.
+    ///
+    /// # Errors
+    /// The frame was not taken and is not sent later; see [`TransmitError`].
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError>;
+}
+
+/// Why a frame was not taken for transmission.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum TransmitError {
+    /// Every transmit buffer is occupied: the bus is slower than its senders. The next sample may succeed.
+    QueueFull,
+    /// The node does not take part in the bus: bus-off (ISO 11898-1), link down or adapter closed.
+    Offline,
+}
+
+impl fmt::Display for TransmitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::QueueFull => "transmit queue full",
+            Self::Offline => "node is off the bus",
+        })
+    }
+}
+
+impl core::error::Error for TransmitError {}
