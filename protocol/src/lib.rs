@@ -15,4 +15,6 @@
 )]
 
 pub mod bus;
+pub mod codes;
 pub mod frame;
+pub mod messages;

@@ -1,0 +1,163 @@
+//! Messages that come with the sampling clock, and the controller's report.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Cause, Compensation, Law, Mode};
+use crate::codes::bits;
+
+/// Drives to controller, every sample: state of the motors at the sampling instant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Feedback {
+    /// Number of the sample, counting up and wrapping.
+    #[serde(with = "postcard::fixint::le")]
+    pub sample: u32,
+    /// What the drives report about themselves.
+    pub status: DriveStatus,
+    /// Multi-turn encoder position, counts, per motor.
+    #[serde(with = "packed_i32")]
+    pub position: [i32; 4],
+    /// Shaft speed, rad/s, per motor.
+    pub velocity: [f32; 4],
+    /// Torque per thousand of rated torque, averaged over the sample just ended, per motor (CiA 402 object 6077h).
+    #[serde(with = "packed_i16")]
+    pub torque: [i16; 4],
+}
+
+bits! {
+    /// What the drives report about themselves.
+    pub struct DriveStatus: u8 {
+        /// Powered, no fault, would take torque.
+        READY = 0, "ready";
+        /// Power stage on.
+        TORQUE_ON = 1, "torque-on";
+        /// Holding brake of the lift released.
+        BRAKE_RELEASED = 2, "brake-released";
+        /// At least one motor could not give the torque asked for.
+        TORQUE_SATURATED = 3, "torque-saturated";
+        /// Emergency stop input active.
+        ESTOP_INPUT = 4, "estop-input";
+        /// A drive is in fault.
+        FAULT = 5, "fault";
+        /// Positions are those of the encoders, and referenced.
+        ENCODER_VALID = 6, "encoder-valid";
+    }
+}
+
+/// Controller to drives, every sample: applied when it arrives.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Command {
+    /// Sample of the feedback that this answers.
+    #[serde(with = "postcard::fixint::le")]
+    pub sample: u32,
+    /// What the drives shall switch.
+    pub control: ControlWord,
+    /// Torque, N m, per motor.
+    pub torque: [f32; 4],
+}
+
+bits! {
+    /// What the drives shall switch.
+    pub struct ControlWord: u8 {
+        /// Power stage on; without it the motors are free of torque whatever is asked for.
+        TORQUE_ENABLE = 0, "torque-enable";
+        /// Release the holding brake of the lift.
+        BRAKE_RELEASE = 1, "brake-release";
+        /// A controlled stop is under way.
+        QUICK_STOP = 2, "quick-stop";
+        /// The controller is in emergency stop.
+        ESTOP = 3, "estop";
+    }
+}
+
+/// Controller to all, 50 Hz: how the cabinet is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct State {
+    /// State of the system.
+    pub mode: Mode,
+    /// First cause of the latched fault, or none.
+    pub cause: Cause,
+    /// Saturations since the last report. Limited is not failed.
+    pub limits: LimitFlags,
+    /// Motions accepted and not yet completed.
+    pub queue: u8,
+    /// Sequence number of the motion completed last.
+    pub completed: u8,
+    /// Samples that took longer than the sampling period; wraps.
+    #[serde(with = "postcard::fixint::le")]
+    pub overruns: u16,
+    /// Frames refused by decoding or by their counter; wraps.
+    #[serde(with = "postcard::fixint::le")]
+    pub rejected: u16,
+    /// Most expensive sample so far in the board's cycle unit; 0 if it has no cycle counter.
+    #[serde(with = "postcard::fixint::le")]
+    pub worst_tick: u32,
+    /// Control law in use.
+    pub law: Law,
+    /// Compensation in use.
+    pub compensation: Compensation,
+    /// Reference minus measurement, joint units (rad, rad, m, rad).
+    pub tracking_error: [f32; 4],
+}
+
+bits! {
+    /// Saturations of the control step.
+    pub struct LimitFlags: u16 {
+        /// Torque of the shoulder motor.
+        TORQUE_SHOULDER = 0, "torque-shoulder";
+        /// Torque of the elbow motor.
+        TORQUE_ELBOW = 1, "torque-elbow";
+        /// Torque of the lift motor.
+        TORQUE_LIFT = 2, "torque-lift";
+        /// Torque of the wrist motor.
+        TORQUE_WRIST = 3, "torque-wrist";
+        /// Speed of the shoulder.
+        VELOCITY_SHOULDER = 4, "velocity-shoulder";
+        /// Speed of the elbow.
+        VELOCITY_ELBOW = 5, "velocity-elbow";
+        /// Speed of the lift.
+        VELOCITY_LIFT = 6, "velocity-lift";
+        /// Speed of the wrist.
+        VELOCITY_WRIST = 7, "velocity-wrist";
+        /// Shoulder at its soft limit.
+        POSITION_SHOULDER = 8, "position-shoulder";
+        /// Elbow at its soft limit.
+        POSITION_ELBOW = 9, "position-elbow";
+        /// Lift at its soft limit.
+        POSITION_LIFT = 10, "position-lift";
+        /// Wrist at its soft limit.
+        POSITION_WRIST = 11, "position-wrist";
+        /// Jacobian inverse damped near the stretched arm.
+        DAMPED = 12, "damped";
+        /// A lost sample was bridged by prediction.
+        PREDICTED = 13, "predicted";
+    }
+}
+
+/// Fixed-width integers in arrays, which postcard's `fixint` does not reach: packed little-endian.
+macro_rules! packed {
+    ($module:ident, $int:ident) => {
+        mod $module {
+            use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+            pub fn serialize<S: Serializer>(
+                values: &[$int; 4],
+                serializer: S,
+            ) -> Result<S::Ok, S::Error> {
+                values.map($int::to_le_bytes).serialize(serializer)
+            }
+
+            pub fn deserialize<'de, D: Deserializer<'de>>(
+                deserializer: D,
+            ) -> Result<[$int; 4], D::Error> {
+                <[[u8; size_of::<$int>()]; 4]>::deserialize(deserializer)
+                    .map(|values| values.map($int::from_le_bytes))
+            }
+        }
+    };
+}
+
+packed!(packed_i32, i32);
+packed!(packed_i16, i16);

@@ -1,0 +1,47 @@
+//! One struct a message; which identifier, length and signals it has stands in [`table`](crate::table).
+//!
+//! Axis order is shoulder, elbow, lift, wrist. Quantities are SI. Motor quantities are those of the motor shafts,
+//! before gears and the coupling of lift and wrist; joint quantities follow `[theta1, theta2, d3, theta4]`, lift
+//! positive downwards, as do forces.
+
+mod cyclic;
+mod motion;
+mod parameter;
+mod service;
+
+pub use cyclic::{Command, ControlWord, DriveStatus, Feedback, LimitFlags, State};
+pub use motion::{
+    Compensation, Law, Motion, MotionReply, MotionRequest, Outcome, Refusal, RefusalReason,
+};
+pub use parameter::{Hello, ParameterError, ParameterReply, ParameterRequest, Server};
+pub use service::{
+    Cause, EStop, EStopReason, Emergency, Heartbeat, Mode, Nmt, NmtCommand, Node, ResetReason,
+};
+
+/// A message of any kind, with the node it concerns where the identifier says so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Message {
+    /// Operator to all: network management.
+    Nmt(Nmt),
+    /// Any node to all: emergency stop.
+    EStop(EStop),
+    /// From this node to all: a fault has just been latched, or all are cleared.
+    Emergency(Node, Emergency),
+    /// Drives to controller: what the motors did in the last sample.
+    Feedback(Feedback),
+    /// Controller to drives: what the motors shall do.
+    Command(Command),
+    /// Operator to controller: a request.
+    Motion(Motion),
+    /// Controller to all: how the cabinet is.
+    State(State),
+    /// Controller to operator: what became of a request.
+    MotionReply(MotionReply),
+    /// From this server to its client.
+    ParameterReply(Server, ParameterReply),
+    /// To this server from its client.
+    ParameterRequest(Server, ParameterRequest),
+    /// From this node to all: alive.
+    Heartbeat(Node, Heartbeat),
+}
