@@ -1,0 +1,119 @@
+//! Holding brake of the lift, closed by a spring when it has no current.
+//!
+//! Dry friction with true sticking (Karnopp 1985): a closed brake at rest is a constraint, not a stiff law, so that a
+//! braked lift neither creeps nor needs small steps. It slips only while the effort on it exceeds what it holds.
+
+use super::friction::{coulomb, coulomb_secant};
+
+/// The brake with its mechanical delays.
+///
+/// ```text
+///            release, 50 ms              engage, 30 ms
+///  Closed --------------------> Open --------------------> Closed
+///  (sticking <-> slipping)
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Brake {
+    capacity: f64,
+    engaged: bool,
+    closed: bool,
+    due: Option<u64>,
+    sticking: bool,
+}
+
+impl Brake {
+    /// From the command to the closed brake, ns.
+    pub const ENGAGE_NS: u64 = 30_000_000;
+    /// From the command to the open brake, ns.
+    pub const RELEASE_NS: u64 = 50_000_000;
+
+    /// Force held, in terms of the peak effort of the axis: a motor gone wild must not push through, even downwards
+    /// with a heavy payload.
+    const MARGIN: f64 = 1.5;
+    /// Slower than this (m/s) a slipping brake grips; also the speed over which sliding friction builds up.
+    const GRIP_SPEED: f64 = 1e-3;
+
+    /// A closed brake for an axis with this peak effort (N).
+    pub fn new(effort: f64) -> Self {
+        Self {
+            capacity: Self::MARGIN * effort,
+            engaged: true,
+            closed: true,
+            due: None,
+            sticking: true,
+        }
+    }
+
+    /// Commands the brake at time `now` (ns).
+    pub fn command(&mut self, engaged: bool, now: u64) {
+        if engaged != self.engaged {
+            self.engaged = engaged;
+            self.due = Some(
+                now + if engaged {
+                    Self::ENGAGE_NS
+                } else {
+                    Self::RELEASE_NS
+                },
+            );
+        }
+    }
+
+    /// When the mechanism will next move, ns.
+    pub fn due(&self) -> Option<u64> {
+        self.due
+    }
+
+    /// Moves the mechanism if it is time to.
+    pub fn update(&mut self, now: u64) {
+        if self.due.is_some_and(|due| due <= now) {
+            self.due = None;
+            self.closed = self.engaged;
+            self.sticking &= self.closed;
+        }
+    }
+
+    /// Whether the brake pads touch.
+    pub fn is_closed(&self) -> bool {
+        self.closed
+    }
+
+    /// Whether the lift cannot move.
+    pub fn is_sticking(&self) -> bool {
+        self.sticking
+    }
+
+    /// Force that the brake can hold, N.
+    pub fn capacity(&self) -> f64 {
+        self.capacity
+    }
+
+    /// The brake under an effort (N) while sticking: lets go beyond its capacity.
+    pub(super) fn load(&mut self, effort: f64) {
+        self.sticking &= effort.abs() <= self.capacity;
+    }
+
+    /// The brake at speed `speed` (m/s): grips, when nearly at rest. Returns whether it grips now and did not before.
+    pub(super) fn grip(&mut self, speed: f64) -> bool {
+        let grips = self.closed && !self.sticking && speed.abs() < Self::GRIP_SPEED;
+        self.sticking |= grips;
+        grips
+    }
+
+    /// Friction against a sliding lift, N.
+    pub(super) fn sliding_friction(&self, speed: f64) -> f64 {
+        coulomb(self.sliding_capacity(), Self::GRIP_SPEED, speed)
+    }
+
+    /// That friction divided by speed.
+    pub(super) fn sliding_secant(&self, speed: f64) -> f64 {
+        coulomb_secant(self.sliding_capacity(), Self::GRIP_SPEED, speed)
+    }
+
+    fn sliding_capacity(&self) -> f64 {
+        if self.closed && !self.sticking {
+            self.capacity
+        } else {
+            0.0
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! Where the flange is, how it moves, and which joint positions bring it somewhere.
+
+use super::arm::{Arm, Configuration};
+use super::spatial::{Motion, Transform};
+use crate::model::{Geometry, JointLimits};
+use nalgebra::{Matrix3, SMatrix, Vector3, Vector4, Vector6};
+use std::f64::consts::{PI, TAU};
+
+/// Place of the flange that a SCARA can choose: the rest of the orientation is always "pointing down".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// m, frame 0.
+    pub x: f64,
+    /// m, frame 0.
+    pub y: f64,
+    /// m, frame 0, up.
+    pub z: f64,
+    /// `theta1 + theta2 - theta4`, rad in (-pi, pi].
+    pub yaw: f64,
+}
+
+/// What is outside the limits in an otherwise possible solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Violation {
+    /// The elbow folds or stretches too far.
+    Elbow,
+    /// Axis 1 would pass its stop.
+    Shoulder,
+    /// The target is above the retracted shaft.
+    TooHigh,
+    /// The target is below the extended shaft.
+    TooLow,
+    /// No turn of axis 4 gives the yaw.
+    Wrist,
+}
+
+/// One of the two solutions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solution {
+    /// Joint positions; revolute ones in (-pi, pi].
+    pub q: Vector4<f64>,
+    /// The first limit that the solution breaks, in the order of [`Violation`].
+    pub violation: Option<Violation>,
+}
+
+/// Both arms' lengths together do not allow the radius.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unreachable {
+    /// Further out than the stretched arm.
+    TooFar,
+    /// Nearer than the folded arm.
+    InsideHole,
+}
+
+/// Radii (m) and limits (m, rad) count as reached within this: far below any mechanism, far above rounding.
+const TOLERANCE: f64 = 1e-9;
+
+impl Arm {
+    /// Origin (m) and orientation of the flange in frame 0.
+    pub fn flange(&self, at: &Configuration) -> (Vector3<f64>, Matrix3<f64>) {
+        let to_flange = self.to_flange(at);
+        (to_flange.origin, to_flange.rotation.transpose())
+    }
+
+    /// Forward kinematics.
+    pub fn pose(&self, at: &Configuration) -> Pose {
+        let (origin, rotation) = self.flange(at);
+        Pose {
+            x: origin.x,
+            y: origin.y,
+            z: origin.z,
+            yaw: wrap(rotation[(1, 0)].atan2(rotation[(0, 0)])),
+        }
+    }
+
+    /// Geometric Jacobian of the flange origin, in the axes of frame 0; rows vx vy vz wx wy wz.
+    pub fn jacobian(&self, at: &Configuration) -> SMatrix<f64, 6, 4> {
+        SMatrix::from_columns(&self.axes_at_flange(at).map(|axis| rows(&axis)))
+    }
+
+    /// Velocity of the flange origin (m/s) over its angular velocity (rad/s), in the axes of frame 0.
+    pub fn twist(&self, at: &Configuration, qd: &Vector4<f64>) -> Vector6<f64> {
+        self.jacobian(at) * qd
+    }
+
+    /// Time derivative of the Jacobian times `qd`: the classical acceleration of the flange at zero joint acceleration.
+    pub fn jacobian_rate_times(&self, at: &Configuration, qd: &Vector4<f64>) -> Vector6<f64> {
+        let axes = self.axes_at_flange(at);
+        let (mut velocity, mut acceleration) = (Motion::zero(), Motion::zero());
+        for (axis, &speed) in axes.iter().zip(qd) {
+            velocity = velocity + *axis * speed;
+            acceleration = acceleration + velocity.cross(axis) * speed;
+        }
+        // Spatial acceleration is that of the stream of points through a fixed place; the flange moves along.
+        acceleration.linear += velocity.angular.cross(&velocity.linear);
+        rows(&acceleration)
+    }
+
+    fn axes_at_flange(&self, at: &Configuration) -> [Motion; 4] {
+        let to_point = Transform::translation(self.to_flange(at).origin);
+        self.axes(at).map(|axis| to_point.motion(&axis))
+    }
+}
+
+fn rows(motion: &Motion) -> Vector6<f64> {
+    let (v, w) = (motion.linear, motion.angular);
+    Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
+}
+
+/// Inverse kinematics: the solutions with `theta2 >= 0` and with `theta2 <= 0`, in this order.
+///
+/// Half-angle form of the law of cosines, which stays well conditioned up to the stretched arm; radii beyond the
+/// workspace by less than 1e-9 m are moved onto its border.
+pub fn inverse(
+    geometry: &Geometry,
+    limits: &JointLimits,
+    pose: &Pose,
+) -> Result<[Solution; 2], Unreachable> {
+    let Geometry { a1, a2, d1, d2, d4 } = *geometry;
+    let radius = pose.x.hypot(pose.y);
+    let (outer, inner) = (a1 + a2, (a1 - a2).abs());
+    if radius > outer + TOLERANCE {
+        return Err(Unreachable::TooFar);
+    }
+    if radius < inner - TOLERANCE {
+        return Err(Unreachable::InsideHole);
+    }
+    let to_outer = ((outer - radius) * (outer + radius)).max(0.0).sqrt();
+    let to_inner = ((radius - inner) * (radius + inner)).max(0.0).sqrt();
+    Ok([1.0, -1.0].map(|side| {
+        let theta2 = side * 2.0 * to_outer.atan2(to_inner);
+        let theta1 = wrap(pose.y.atan2(pose.x) - (a2 * theta2.sin()).atan2(a1 + a2 * theta2.cos()));
+        let q = Vector4::new(
+            theta1,
+            theta2,
+            d1 + d2 - d4 - pose.z,
+            wrap(theta1 + theta2 - pose.yaw),
+        );
+        Solution {
+            q,
+            violation: violation(limits, &q),
+        }
+    }))
+}
+
+fn violation(limits: &JointLimits, q: &Vector4<f64>) -> Option<Violation> {
+    let within = |axis: usize, value: f64| {
+        (limits.lower[axis] - TOLERANCE..=limits.upper[axis] + TOLERANCE).contains(&value)
+    };
+    // The smallest turn that is not below the lower limit is the only one to look at.
+    let some_turn_within = |axis: usize| {
+        let turns = ((limits.lower[axis] - TOLERANCE - q[axis]) / TAU).ceil();
+        within(axis, q[axis] + TAU * turns)
+    };
+    if !some_turn_within(1) {
+        Some(Violation::Elbow)
+    } else if !some_turn_within(0) {
+        Some(Violation::Shoulder)
+    } else if q[2] < limits.lower[2] - TOLERANCE {
+        Some(Violation::TooHigh)
+    } else if q[2] > limits.upper[2] + TOLERANCE {
+        Some(Violation::TooLow)
+    } else if !some_turn_within(3) {
+        Some(Violation::Wrist)
+    } else {
+        None
+    }
+}
+
+/// The same angle in (-pi, pi].
+pub fn wrap(angle: f64) -> f64 {
+    angle - TAU * ((angle - PI) / TAU).ceil()
+}

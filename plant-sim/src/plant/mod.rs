@@ -1,0 +1,350 @@
+//! The robot as physics: rigid arm, drives, friction, brake, end stops, encoders.
+//!
+//! Joint vectors are `[theta1, theta2, d3, theta4]`; SI units; efforts are torques in N m, on axis 3 a force in N,
+//! positive downwards. Nothing here knows what controls the robot or how it is connected.
+
+pub mod arm;
+pub mod brake;
+pub mod drive;
+pub mod encoder;
+mod friction;
+mod integrator;
+pub mod kinematics;
+pub mod spatial;
+pub mod stop;
+
+use crate::model::{Payload, RobotModel};
+use arm::{Arm, Configuration};
+use brake::Brake;
+use drive::Drive;
+use encoder::Encoder;
+use integrator::Rates;
+use kinematics::Pose;
+use nalgebra::{Matrix4, Vector4};
+use stop::EndStops;
+
+/// Index of the lift among the joints.
+const LIFT: usize = 2;
+
+/// The robot in motion.
+///
+/// A new plant is at rest as after power-up: torque off, brake closed, nothing held, time 0.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    model: RobotModel,
+    payload: Option<Payload>,
+    arm: Arm,
+    drive: Drive,
+    encoder: Encoder,
+    stops: EndStops,
+    brake: Brake,
+    q: Vector4<f64>,
+    qd: Vector4<f64>,
+    request: Vector4<f64>,
+    torque_enabled: bool,
+    now: u64,
+    max_step: u64,
+    ledger: Rates,
+    latched: (u64, Vector4<f64>),
+}
+
+/// What the drives measure, sampled by [`Plant::latch`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Motor encoders.
+    pub counts: [i32; 4],
+    /// Mean motor torque since the sample before, N m.
+    pub motor_torque: [f64; 4],
+}
+
+/// Where the energy is and where it went, J.
+///
+/// `kinetic + potential + elastic - motor_work + lost` is constant but for errors of integration and for payloads that
+/// come and go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Energy {
+    /// Of links, payload and rotors.
+    pub kinetic: f64,
+    /// Zero with all mass in the plane of frame 0.
+    pub potential: f64,
+    /// In the springs of the end stops.
+    pub elastic: f64,
+    /// Work that the motors have done since the beginning.
+    pub motor_work: f64,
+    /// What friction, brake and end stops have turned into heat since the beginning.
+    pub lost: f64,
+}
+
+/// Efforts and losses at one state.
+struct Balance {
+    /// Everything that accelerates the joints.
+    effort: Vector4<f64>,
+    rates: Rates,
+}
+
+impl Plant {
+    /// Default longest step of integration, ns. The fastest thing it must resolve is a joint on its end stop
+    /// (400 rad/s): a tenth of a radian a step.
+    pub const MAX_STEP_NS: u64 = 250_000;
+
+    /// The robot of `model` at rest at joint positions `q`.
+    pub fn new(model: &RobotModel, q: [f64; 4]) -> Self {
+        let arm = Arm::new(model, None);
+        let drive = Drive::new(&model.drive);
+        let stretched = arm.mass_matrix(&arm.at(&Vector4::zeros())) + drive.rotor_inertia();
+        Self {
+            payload: None,
+            arm,
+            encoder: Encoder::new(model.drive.encoder_counts),
+            stops: EndStops::new(&model.limits, &stretched.diagonal()),
+            drive,
+            brake: Brake::new(model.limits.effort[LIFT]),
+            model: model.clone(),
+            q: q.into(),
+            qd: Vector4::zeros(),
+            request: Vector4::zeros(),
+            torque_enabled: false,
+            now: 0,
+            max_step: Self::MAX_STEP_NS,
+            ledger: Rates::zeros(),
+            latched: (0, Vector4::zeros()),
+        }
+    }
+
+    /// Sets the longest step of integration, ns (at least 1).
+    pub fn set_max_step(&mut self, ns: u64) {
+        self.max_step = ns.max(1);
+    }
+
+    /// Sets the joint speeds, as for a start in the middle of a motion. A lift that the brake holds stays at rest.
+    pub fn set_speed(&mut self, qd: [f64; 4]) {
+        self.qd = qd.into();
+        if self.brake.is_sticking() {
+            self.qd[LIFT] = 0.0;
+        }
+    }
+
+    /// Asks the motors for torques (N m), from now on.
+    ///
+    /// Returns which of them are saturated: beyond the torque limit, or beyond what is left above the speed limit. A
+    /// request that is not a number counts as zero and as saturated.
+    pub fn set_motor_torque(&mut self, torque: [f64; 4]) -> [bool; 4] {
+        self.request = Vector4::from(torque).map(|t| if t.is_nan() { 0.0 } else { t });
+        let given = self
+            .drive
+            .limited(&self.request, &self.drive.to_motor(&self.qd));
+        std::array::from_fn(|i| torque[i] != given[i])
+    }
+
+    /// Switches all motors on or off. The last request stays.
+    pub fn set_torque_enabled(&mut self, enabled: bool) {
+        self.torque_enabled = enabled;
+    }
+
+    /// Commands the brake of the lift; it follows after [`Brake::ENGAGE_NS`] or [`Brake::RELEASE_NS`].
+    pub fn set_brake(&mut self, engaged: bool) {
+        self.brake.command(engaged, self.now);
+    }
+
+    /// Puts a payload into the gripper, in place of any other. It is taken over at the speed of the flange.
+    pub fn attach(&mut self, payload: Payload) {
+        self.hold(Some(payload));
+    }
+
+    /// Lets go of the payload.
+    pub fn release(&mut self) {
+        self.hold(None);
+    }
+
+    fn hold(&mut self, payload: Option<Payload>) {
+        self.payload = payload;
+        self.arm = Arm::new(&self.model, payload.as_ref());
+    }
+
+    /// Integrates up to time `t` (ns). Earlier times do nothing.
+    ///
+    /// Steps are [`Plant::MAX_STEP_NS`] long; the last one, and one that ends where the brake moves, are shorter.
+    pub fn advance_to(&mut self, t: u64) {
+        self.brake.update(self.now);
+        while self.now < t {
+            let end = t
+                .min(self.now + self.max_step)
+                .min(self.brake.due().unwrap_or(u64::MAX));
+            self.step((end - self.now) as f64 * 1e-9);
+            self.now = end;
+            self.brake.update(end);
+        }
+    }
+
+    fn step(&mut self, h: f64) {
+        let at = self.arm.at(&self.q);
+        if self.brake.is_sticking() {
+            self.brake.load(self.effort_on_brake(&at));
+        }
+        let mass = self.constrained(self.total_mass(&at));
+        let mut damping = self.drive.friction_secant(&self.qd);
+        damping[LIFT] += self.brake.sliding_secant(self.qd[LIFT]);
+        let (mut q, mut qd) = (self.q, self.qd);
+        let ledger = integrator::step(&mut q, &mut qd, h, &mass, &damping, |q, qd| {
+            let at = self.arm.at(q);
+            let balance = self.balance(&at, q, qd);
+            (self.acceleration(&at, &balance.effort), balance.rates)
+        });
+        (self.q, self.qd) = (q, qd);
+        self.ledger += ledger;
+        if self.brake.grip(self.qd[LIFT]) {
+            self.stop_lift();
+        }
+    }
+
+    /// Takes the last millimetre per second out of a gripped lift, by the impulse at the lift that does it.
+    fn stop_lift(&mut self) {
+        let mass = self.total_mass(&self.arm.at(&self.q));
+        let response = integrator::factor(&mass).solve(&Vector4::ith(LIFT, 1.0));
+        let impulse = -self.qd[LIFT] / response[LIFT];
+        // An impulse works at the mean of the speeds before and after.
+        self.ledger[5] -= 0.5 * impulse * self.qd[LIFT];
+        self.qd += response * impulse;
+        self.qd[LIFT] = 0.0;
+    }
+
+    fn total_mass(&self, at: &Configuration) -> Matrix4<f64> {
+        self.arm.mass_matrix(at) + self.drive.rotor_inertia()
+    }
+
+    /// The mass matrix with the lift taken out while the brake holds it.
+    fn constrained(&self, mut mass: Matrix4<f64>) -> Matrix4<f64> {
+        if self.brake.is_sticking() {
+            mass.fill_row(LIFT, 0.0);
+            mass.fill_column(LIFT, 0.0);
+            mass[(LIFT, LIFT)] = 1.0;
+        }
+        mass
+    }
+
+    fn acceleration(&self, at: &Configuration, effort: &Vector4<f64>) -> Vector4<f64> {
+        let mut effort = *effort;
+        if self.brake.is_sticking() {
+            effort[LIFT] = 0.0;
+        }
+        integrator::factor(&self.constrained(self.total_mass(at))).solve(&effort)
+    }
+
+    /// What a sticking brake must hold, N.
+    fn effort_on_brake(&self, at: &Configuration) -> f64 {
+        let effort = self.balance(at, &self.q, &self.qd).effort;
+        let acceleration = self.acceleration(at, &effort);
+        effort[LIFT] - (self.total_mass(at) * acceleration)[LIFT]
+    }
+
+    fn balance(&self, at: &Configuration, q: &Vector4<f64>, qd: &Vector4<f64>) -> Balance {
+        let speed = self.drive.to_motor(qd);
+        let torque = self.given_torque(&speed);
+        let mut friction = self.drive.friction(qd);
+        friction[LIFT] += self.brake.sliding_friction(qd[LIFT]);
+        let stop = self.stops.effort(q, qd);
+        let effort = self.drive.joint_effort(&torque) - self.arm.bias(at, qd) - friction + stop;
+        let lost = friction.dot(qd) - stop.dot(qd) - self.stops.spring_power(q, qd);
+        let rates = Rates::new(
+            torque[0],
+            torque[1],
+            torque[2],
+            torque[3],
+            torque.dot(&speed),
+            lost,
+        );
+        Balance { effort, rates }
+    }
+
+    fn given_torque(&self, motor_speed: &Vector4<f64>) -> Vector4<f64> {
+        if self.torque_enabled {
+            self.drive.limited(&self.request, motor_speed)
+        } else {
+            Vector4::zeros()
+        }
+    }
+
+    /// Samples encoders and the mean torque since the last sample.
+    pub fn latch(&mut self) -> Sample {
+        let (since, before) = self.latched;
+        let total: Vector4<f64> = self.ledger.fixed_rows::<4>(0).into();
+        let motor_torque = if self.now > since {
+            ((total - before) / ((self.now - since) as f64 * 1e-9)).into()
+        } else {
+            self.motor_torque()
+        };
+        self.latched = (self.now, total);
+        Sample {
+            counts: self.encoder_counts(),
+            motor_torque,
+        }
+    }
+
+    /// Readings of the motor encoders.
+    pub fn encoder_counts(&self) -> [i32; 4] {
+        <[f64; 4]>::from(self.drive.to_motor(&self.q)).map(|angle| self.encoder.counts(angle))
+    }
+
+    /// Time, ns.
+    pub fn now(&self) -> u64 {
+        self.now
+    }
+
+    /// True joint positions, rad and m.
+    pub fn q(&self) -> [f64; 4] {
+        self.q.into()
+    }
+
+    /// True joint speeds, rad/s and m/s.
+    pub fn qd(&self) -> [f64; 4] {
+        self.qd.into()
+    }
+
+    /// True place of the flange.
+    pub fn pose(&self) -> Pose {
+        self.arm.pose(&self.arm.at(&self.q))
+    }
+
+    /// Torques that the motors give now, after all limits, N m.
+    pub fn motor_torque(&self) -> [f64; 4] {
+        self.given_torque(&self.drive.to_motor(&self.qd)).into()
+    }
+
+    /// Efforts that the motors bring to the joints now, after all limits, N m and N.
+    pub fn joint_effort(&self) -> [f64; 4] {
+        self.drive.joint_effort(&self.motor_torque().into()).into()
+    }
+
+    /// The account of energy.
+    pub fn energy(&self) -> Energy {
+        let at = self.arm.at(&self.q);
+        let rotors = 0.5 * self.qd.dot(&(self.drive.rotor_inertia() * self.qd));
+        Energy {
+            kinetic: self.arm.kinetic_energy(&at, &self.qd) + rotors,
+            potential: self.arm.potential_energy(&at),
+            elastic: self.stops.energy(&self.q),
+            motor_work: self.ledger[4],
+            lost: self.ledger[5],
+        }
+    }
+
+    /// The rigid arm with what it holds.
+    pub fn arm(&self) -> &Arm {
+        &self.arm
+    }
+
+    /// The drives.
+    pub fn drive(&self) -> &Drive {
+        &self.drive
+    }
+
+    /// The brake of the lift.
+    pub fn brake(&self) -> &Brake {
+        &self.brake
+    }
+
+    /// What is held.
+    pub fn payload(&self) -> Option<&Payload> {
+        self.payload.as_ref()
+    }
+}
