@@ -178,6 +178,17 @@ impl Refusal {
             limit: 0.0,
         }
     }
+
+    /// A refusal because of one value of the request.
+    #[must_use]
+    pub const fn value(reason: RefusalReason, value: f32, limit: f32) -> Self {
+        Self {
+            reason,
+            axis: Self::NO_AXIS,
+            value,
+            limit,
+        }
+    }
 }
 
 codes! {
@@ -207,5 +218,9 @@ codes! {
         PayloadTooHeavy = 10, "payload-too-heavy";
         /// Not while a motion is under way.
         Moving = 11, "moving";
+        /// The drive cannot hold the arm on this move, however slow: a torque would pass its limit.
+        TorqueTooSmall = 12, "torque-too-small";
+        /// A stop came before the move was planned.
+        Stopped = 13, "stopped";
     }
 }

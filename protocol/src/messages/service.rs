@@ -158,6 +158,8 @@ codes! {
         Fault = 9, "fault";
         /// Torque off after an emergency stop; latched.
         EStop = 10, "estop";
+        /// The brake closes while torque still holds the arm; then torque goes off.
+        Disabling = 11, "disabling";
     }
 }
 
