@@ -1,0 +1,305 @@
+//! Grammar of one line of a log.
+
+use protocol::frame::{CLASSICAL_MAX, CanFrame, ExtendedId, FD_MAX, Id, StandardId, fd_length};
+
+use super::{ERROR_FLAG, Entry, ErrorFrame, FLAG_BRS, FLAG_ESI, FLAG_FDF, Interface, Record};
+
+/// Longest line, line feed not counted, bytes. The longest that can be meant has fewer than 200: timestamp, interface
+/// name, identifier and 64 data bytes.
+pub(super) const MAX_LINE: usize = 256;
+
+/// What is wrong with a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Problem {
+    /// Longer than any line of a log.
+    #[error("longer than {MAX_LINE} bytes; no line of a candump log is")]
+    TooLong,
+    /// The file ends within the line.
+    #[error("no line feed at the end; the log was cut off and the frame may be")]
+    Unterminated,
+    /// Line end of another system.
+    #[error("ends in CR LF; lines of a candump log end in LF alone")]
+    CarriageReturn,
+    /// The capture itself lost frames here.
+    #[error("candump reports that it dropped frames here")]
+    Dropped,
+    /// No timestamp in parentheses, or not one number with a point.
+    #[error(
+        "no timestamp at the start; (seconds.microseconds) is allowed, such as (0000000012.345678)"
+    )]
+    Timestamp,
+    /// Wrong number of decimals.
+    #[error("timestamp has {0} decimals; exactly 6 are allowed")]
+    Decimals(usize),
+    /// More microseconds than 64 bits hold.
+    #[error("timestamp does not fit 64 bits of us; {} seconds are allowed", u64::MAX / 1_000_000 - 1)]
+    TimestampRange,
+    /// No interface name, or a wrong one.
+    #[error(
+        "no interface name of 1 to {} printable ASCII characters after the timestamp",
+        Interface::MAX
+    )]
+    Interface,
+    /// No `#`.
+    #[error("no '#' between identifier and data")]
+    Separator,
+    /// Wrong number of identifier digits.
+    #[error("identifier has {0} digits; 3 (standard) or 8 (extended, error frame) are allowed")]
+    IdDigits(usize),
+    /// Identifier out of range.
+    #[error("identifier {id:X} is above {max:X}")]
+    IdRange {
+        /// The identifier.
+        id: u32,
+        /// Highest of its kind; of an error frame with the error flag.
+        max: u32,
+    },
+    /// Not a hexadecimal digit.
+    #[error("column {column}: {found:?} where a hexadecimal digit is expected")]
+    Hex {
+        /// Byte of the line, counted from 1.
+        column: usize,
+        /// What stands there.
+        found: char,
+    },
+    /// Half a byte at the end.
+    #[error("odd number of data digits; a byte has two")]
+    OddDigits,
+    /// Length that no frame of this kind has.
+    #[error("{found} data bytes; {allowed} are allowed")]
+    Length {
+        /// Data bytes on the line.
+        found: usize,
+        /// What a frame of this kind may have.
+        allowed: &'static str,
+    },
+    /// Remote frame with more than a length.
+    #[error("remote frame with something after R; nothing or one digit 0 to 8 is allowed")]
+    Remote,
+    /// FD flags that do not exist.
+    #[error("FD flags {0:X}; the sum of 1 (BRS), 2 (ESI) and 4 (FDF) is allowed")]
+    Flags(u8),
+    /// FD frame without flags.
+    #[error("FD frame without flags; one hexadecimal digit is expected after ##")]
+    NoFlags,
+    /// Something after the frame.
+    #[error("text after the frame; nothing, R (received) or T (transmitted) is allowed")]
+    Trailing,
+}
+
+/// Parses one line without its line feed.
+pub(super) fn parse(line: &[u8]) -> Result<Record, Problem> {
+    if line.ends_with(b"\r") {
+        return Err(Problem::CarriageReturn);
+    }
+    if line.starts_with(b"DROPCOUNT:") {
+        return Err(Problem::Dropped);
+    }
+    let rest = line.strip_prefix(b"(").ok_or(Problem::Timestamp)?;
+    let (stamp, rest) = split_at_byte(rest, b')').ok_or(Problem::Timestamp)?;
+    let time_us = timestamp(stamp)?;
+
+    // candump aligns names of several interfaces with blanks.
+    let rest = rest.strip_prefix(b" ").ok_or(Problem::Interface)?;
+    let rest = rest.trim_ascii_start();
+    let (name, rest) = split_at_byte(rest, b' ').ok_or(Problem::Interface)?;
+    let interface = Interface::from_bytes(name).ok_or(Problem::Interface)?;
+
+    let (frame, direction) = split_at_byte(rest, b' ').map_or((rest, None), |(f, d)| (f, Some(d)));
+    if !matches!(direction, None | Some(b"R" | b"T")) {
+        return Err(Problem::Trailing);
+    }
+    let entry = entry(Text {
+        bytes: frame,
+        column: line.len() - rest.len() + 1,
+    })?;
+    Ok(Record {
+        time_us,
+        interface,
+        entry,
+    })
+}
+
+/// Microseconds of `seconds.microseconds`.
+fn timestamp(text: &[u8]) -> Result<u64, Problem> {
+    let (seconds, decimals) = split_at_byte(text, b'.').ok_or(Problem::Timestamp)?;
+    let digits = |text: &[u8]| !text.is_empty() && text.iter().all(u8::is_ascii_digit);
+    if !digits(seconds) || !decimals.iter().all(u8::is_ascii_digit) {
+        return Err(Problem::Timestamp);
+    }
+    if decimals.len() != 6 {
+        return Err(Problem::Decimals(decimals.len()));
+    }
+    seconds
+        .iter()
+        .chain(decimals)
+        .try_fold(0_u64, |value, digit| {
+            value.checked_mul(10)?.checked_add(u64::from(digit - b'0'))
+        })
+        .ok_or(Problem::TimestampRange)
+}
+
+/// Part of a line that remembers where it stands.
+#[derive(Clone, Copy)]
+struct Text<'a> {
+    bytes: &'a [u8],
+    /// Of the first byte, counted from 1.
+    column: usize,
+}
+
+impl<'a> Text<'a> {
+    /// The first `count` bytes and what follows; `count` is at most the length.
+    fn split(self, count: usize) -> (Self, Self) {
+        let (head, tail) = self.bytes.split_at(count);
+        let at = |bytes, column| Self { bytes, column };
+        (at(head, self.column), at(tail, self.column + count))
+    }
+
+    fn after(self, prefix: u8) -> Option<Self> {
+        (self.bytes.first() == Some(&prefix)).then(|| self.split(1).1)
+    }
+
+    /// Value of the hexadecimal digits; at most eight.
+    fn number(self) -> Result<u32, Problem> {
+        let mut value = 0;
+        for (offset, &byte) in self.bytes.iter().enumerate() {
+            let found = char::from(byte);
+            let column = self.column + offset;
+            let digit = found.to_digit(16).ok_or(Problem::Hex { column, found })?;
+            value = value << 4 | digit;
+        }
+        Ok(value)
+    }
+
+    /// Data bytes into `buffer`, and how many of them.
+    fn data(self, buffer: &'a mut [u8], allowed: &'static str) -> Result<&'a [u8], Problem> {
+        let found = self.bytes.len() / 2;
+        for (index, pair) in self.bytes.chunks(2).enumerate() {
+            let value = Text {
+                bytes: pair,
+                column: self.column + 2 * index,
+            }
+            .number()?;
+            if let Some(byte) = buffer.get_mut(index) {
+                *byte = value as u8;
+            }
+        }
+        if !self.bytes.len().is_multiple_of(2) {
+            return Err(Problem::OddDigits);
+        }
+        buffer
+            .get(..found)
+            .ok_or(Problem::Length { found, allowed })
+    }
+}
+
+const CLASSICAL_LENGTHS: &str = "0 to 8";
+const FD_LENGTHS: &str = "0 to 8, 12, 16, 20, 24, 32, 48 or 64";
+const ERROR_LENGTHS: &str = "exactly 8";
+
+fn entry(text: Text<'_>) -> Result<Entry, Problem> {
+    let digits = text
+        .bytes
+        .iter()
+        .position(|&byte| byte == b'#')
+        .ok_or(Problem::Separator)?;
+    let (id, rest) = text.split(digits);
+    let rest = rest.split(1).1;
+    if digits == 8 {
+        let raw = id.number()?;
+        if raw & !(ERROR_FLAG - 1) == ERROR_FLAG {
+            return error_frame(raw, rest).map(Entry::Error);
+        }
+    }
+    let id = identifier(id)?;
+    if let Some(fd) = rest.after(b'#') {
+        return fd_frame(id, fd).map(Entry::Frame);
+    }
+    if let Some(length) = rest.after(b'R').or_else(|| rest.after(b'r')) {
+        return remote_frame(id, length).map(Entry::Frame);
+    }
+    let mut buffer = [0; CLASSICAL_MAX];
+    let data = rest.data(&mut buffer, CLASSICAL_LENGTHS)?;
+    CanFrame::classical(id, data)
+        .map(Entry::Frame)
+        .ok_or(Problem::Length {
+            found: data.len(),
+            allowed: CLASSICAL_LENGTHS,
+        })
+}
+
+fn identifier(text: Text<'_>) -> Result<Id, Problem> {
+    let range = |id, max| Problem::IdRange { id, max };
+    match text.bytes.len() {
+        3 => {
+            let id = text.number()?;
+            StandardId::new(id as u16)
+                .map(Id::Standard)
+                .ok_or(range(id, StandardId::MAX.as_raw().into()))
+        }
+        8 => {
+            let id = text.number()?;
+            ExtendedId::new(id)
+                .map(Id::Extended)
+                .ok_or(range(id, ExtendedId::MAX.as_raw()))
+        }
+        digits => Err(Problem::IdDigits(digits)),
+    }
+}
+
+fn error_frame(raw: u32, text: Text<'_>) -> Result<ErrorFrame, Problem> {
+    let mut data = [0; 8];
+    let found = text.data(&mut data, ERROR_LENGTHS)?.len();
+    if found != 8 {
+        return Err(Problem::Length {
+            found,
+            allowed: ERROR_LENGTHS,
+        });
+    }
+    Ok(ErrorFrame {
+        class: raw & (ERROR_FLAG - 1),
+        data,
+    })
+}
+
+fn remote_frame(id: Id, length: Text<'_>) -> Result<CanFrame, Problem> {
+    let length = match length.bytes {
+        [] => 0,
+        [digit @ b'0'..=b'8'] => digit - b'0',
+        _ => return Err(Problem::Remote),
+    };
+    CanFrame::remote(id, length.into()).ok_or(Problem::Remote)
+}
+
+fn fd_frame(id: Id, text: Text<'_>) -> Result<CanFrame, Problem> {
+    if text.bytes.is_empty() {
+        return Err(Problem::NoFlags);
+    }
+    let (flags, data) = text.split(1);
+    let flags = flags.number()? as u8;
+    if flags & !(FLAG_BRS | FLAG_ESI | FLAG_FDF) != 0 {
+        return Err(Problem::Flags(flags));
+    }
+    let mut buffer = [0; FD_MAX];
+    let data = data.data(&mut buffer, FD_LENGTHS)?;
+    let found = data.len();
+    // The frame would pad to the next length: a log holds the frame as it was, so another length is no frame.
+    if fd_length(found) != Some(found) {
+        return Err(Problem::Length {
+            found,
+            allowed: FD_LENGTHS,
+        });
+    }
+    CanFrame::fd(id, data, flags & FLAG_BRS != 0)
+        .map(|frame| frame.with_esi(flags & FLAG_ESI != 0))
+        .ok_or(Problem::Length {
+            found,
+            allowed: FD_LENGTHS,
+        })
+}
+
+/// What stands before and after the first `byte`.
+fn split_at_byte(text: &[u8], byte: u8) -> Option<(&[u8], &[u8])> {
+    let at = text.iter().position(|&b| b == byte)?;
+    Some((&text[..at], &text[at + 1..]))
+}

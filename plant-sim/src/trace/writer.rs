@@ -1,0 +1,153 @@
+//! Log writer: streaming, with the hash of what it wrote.
+
+use std::io::{self, Write};
+
+use protocol::frame::{CanFrame, FrameKind, Id};
+use sha2::{Digest, Sha256};
+
+use super::{
+    ERROR_FLAG, ErrorFrame, FLAG_BRS, FLAG_ESI, Interface, LogHash, line::MAX_LINE as CAPACITY,
+};
+
+/// Writes a log of one interface, line by line, and hashes it on the way.
+///
+/// Two runs wrote the same log exactly if their hashes are equal: that is how a run is proven to be deterministic
+/// without keeping its log. The writer makes one `write_all` a line; give it a buffered sink.
+pub struct Writer<W: Write> {
+    sink: W,
+    interface: Interface,
+    hash: Sha256,
+}
+
+impl<W: Write> Writer<W> {
+    /// An empty log.
+    pub fn new(sink: W, interface: Interface) -> Self {
+        Self {
+            sink,
+            interface,
+            hash: Sha256::new(),
+        }
+    }
+
+    /// Appends a frame at `time_us`.
+    ///
+    /// # Errors
+    /// Those of the sink. The hash covers whole lines only.
+    pub fn frame(&mut self, time_us: u64, frame: &CanFrame) -> io::Result<()> {
+        let mut line = Line::new(time_us, &self.interface);
+        match frame.id() {
+            Id::Standard(id) => line.hex(id.as_raw().into(), 3),
+            Id::Extended(id) => line.hex(id.as_raw(), 8),
+        }
+        line.byte(b'#');
+        match frame.kind() {
+            FrameKind::Classical { remote: false } => {}
+            FrameKind::Classical { remote: true } => {
+                line.byte(b'R');
+                // A length of zero is left out, as can-utils does.
+                if frame.dlc() > 0 {
+                    line.byte(b'0' + frame.dlc());
+                }
+            }
+            FrameKind::Fd { brs, esi } => {
+                line.byte(b'#');
+                let flags = (u8::from(brs) * FLAG_BRS) | (u8::from(esi) * FLAG_ESI);
+                line.hex(flags.into(), 1);
+            }
+        }
+        line.data(frame.data());
+        self.append(line)
+    }
+
+    /// Appends what a controller reported at `time_us`.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn error(&mut self, time_us: u64, error: &ErrorFrame) -> io::Result<()> {
+        let mut line = Line::new(time_us, &self.interface);
+        line.hex(error.class & (ERROR_FLAG - 1) | ERROR_FLAG, 8);
+        line.byte(b'#');
+        line.data(&error.data);
+        self.append(line)
+    }
+
+    /// Flushes the sink and gives it back with the hash of all that was written.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn finish(mut self) -> io::Result<(W, LogHash)> {
+        self.sink.flush()?;
+        Ok((self.sink, LogHash(self.hash.finalize().into())))
+    }
+
+    fn append(&mut self, mut line: Line) -> io::Result<()> {
+        line.byte(b'\n');
+        self.sink.write_all(line.bytes())?;
+        self.hash.update(line.bytes());
+        Ok(())
+    }
+}
+
+/// One line under construction. Formatted by hand: `core::fmt` would cost several times the rest of the writer.
+struct Line {
+    buffer: [u8; CAPACITY],
+    len: usize,
+}
+
+impl Line {
+    fn new(time_us: u64, interface: &Interface) -> Self {
+        let mut line = Self {
+            buffer: [0; CAPACITY],
+            len: 0,
+        };
+        line.byte(b'(');
+        line.decimal(time_us / 1_000_000, 10);
+        line.byte(b'.');
+        line.decimal(time_us % 1_000_000, 6);
+        line.extend(b") ");
+        line.extend(interface.as_bytes());
+        line.byte(b' ');
+        line
+    }
+
+    fn bytes(&self) -> &[u8] {
+        &self.buffer[..self.len]
+    }
+
+    fn byte(&mut self, byte: u8) {
+        self.buffer[self.len] = byte;
+        self.len += 1;
+    }
+
+    fn extend(&mut self, bytes: &[u8]) {
+        self.buffer[self.len..][..bytes.len()].copy_from_slice(bytes);
+        self.len += bytes.len();
+    }
+
+    /// Decimal digits, zeros in front up to `width`; a larger number takes what it needs.
+    fn decimal(&mut self, mut value: u64, width: usize) {
+        let mut digits = [b'0'; 20];
+        let mut first = digits.len();
+        while value > 0 {
+            first -= 1;
+            digits[first] = b'0' + (value % 10) as u8;
+            value /= 10;
+        }
+        self.extend(&digits[first.min(digits.len() - width)..]);
+    }
+
+    /// The low `digits` hexadecimal digits.
+    fn hex(&mut self, value: u32, digits: u32) {
+        for digit in (0..digits).rev() {
+            self.byte(HEX[(value >> (4 * digit) & 0xF) as usize]);
+        }
+    }
+
+    fn data(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.hex(byte.into(), 2);
+        }
+    }
+}
+
+const HEX: &[u8; 16] = b"0123456789ABCDEF";
