@@ -1,6 +1,8 @@
 //! What is on the wire between the drive cabinet's controller, its drives and the operator, and nothing else.
 //!
-//! A frame comes from a [`Bus`](bus::Bus) that never blocks, and goes back to one.
+//! A frame comes from a [`Bus`](bus::Bus) that never blocks; the [`codec`] makes a message of it or says what is wrong
+//! with it; a [`Receiver`](e2e::Receiver) judges its place in the sequence. The way back is [`codec::encode`]. What
+//! identifiers and bytes mean stands in one [`table`].
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -15,6 +17,13 @@
 )]
 
 pub mod bus;
+pub mod codec;
 pub mod codes;
+pub mod counters;
+pub mod e2e;
 pub mod frame;
 pub mod messages;
+pub mod schema;
+mod signals;
+pub mod slcan;
+pub mod table;

@@ -85,10 +85,10 @@ pub struct State {
     pub queue: u8,
     /// Sequence number of the motion completed last.
     pub completed: u8,
-    /// Samples that took longer than the sampling period; wraps.
+    /// Samples that took longer than the sampling period; stays at its greatest value.
     #[serde(with = "postcard::fixint::le")]
     pub overruns: u16,
-    /// Frames refused by decoding or by their counter; wraps.
+    /// Frames dropped, by decoding or for their counter; stays at its greatest value.
     #[serde(with = "postcard::fixint::le")]
     pub rejected: u16,
     /// Most expensive sample so far in the board's cycle unit; 0 if it has no cycle counter.

@@ -1,0 +1,300 @@
+//! Message to frame and back.
+//!
+//! postcard reads malleable input: trailing bytes, overlong integers, numbers that are none. Decoding therefore goes on
+//! after it, and in this order: identifier, format and length; CRC; postcard; padding zero and re-encoding equal to the
+//! input, so that each message has exactly one frame; every float finite and within its range. A frame that fails
+//! anywhere yields an error and nothing else. The counter is judged outside, by [`Receiver`](crate::e2e::Receiver),
+//! because only the caller knows what was received before.
+
+use core::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::frame::{CanFrame, FD_MAX, Id, StandardId};
+use crate::messages::{EStop, EStopReason, Message};
+use crate::schema::{Content, Kind, MessageInfo};
+use crate::table;
+
+/// A message as it came, with its end-to-end counter if it carries one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Received {
+    /// Message.
+    pub message: Message,
+    /// Counter for [`Receiver::judge`](crate::e2e::Receiver::judge).
+    pub counter: Option<u8>,
+}
+
+/// A float that is not sent and not used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ValueError {
+    /// Infinite or not a number.
+    NotFinite {
+        /// Signal.
+        signal: &'static str,
+        /// Element of it; empty if it is one number.
+        element: &'static str,
+    },
+    /// Out of the signal's range.
+    OutOfRange {
+        /// Signal.
+        signal: &'static str,
+        /// Element of it; empty if it is one number.
+        element: &'static str,
+        /// Value.
+        value: f32,
+        /// Least value allowed.
+        min: f32,
+        /// Greatest value allowed.
+        max: f32,
+    },
+}
+
+/// Why a message was not made a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum EncodeError {
+    /// The receiver would refuse it.
+    Value(ValueError),
+    /// Struct and table disagree on the length: a defect of this crate.
+    TooLong,
+}
+
+/// Why a frame is no message.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum DecodeError {
+    /// No message has this identifier; 29-bit identifiers are never ours.
+    UnknownId,
+    /// Remote, or FD where classical is due, or the other way round.
+    WrongKind,
+    /// Not the message's length.
+    WrongLength {
+        /// Bytes in the frame.
+        found: usize,
+        /// Bytes of the message.
+        expected: usize,
+    },
+    /// The end-to-end CRC is not that of content and identifier.
+    Crc,
+    /// A code or bit without meaning.
+    Malformed,
+    /// Padding or an encoding that no sender of ours makes.
+    NotCanonical,
+    /// A float that is none, or out of range.
+    Value(ValueError),
+}
+
+/// Frame of a message. `counter` counts the frames of the identifier, wrapping at 256; it is reduced to the width the
+/// frame has room for, and ignored where it has none.
+///
+/// # Errors
+/// A float is not finite or out of its range: what every receiver would refuse is not sent.
+pub fn encode(message: &Message, counter: u8) -> Result<CanFrame, EncodeError> {
+    let info = info_of(message);
+    let mut buffer = [0; FD_MAX];
+    let data = buffer.get_mut(..info.len).ok_or(EncodeError::TooLong)?;
+    let body = data
+        .get_mut(..info.body_len())
+        .ok_or(EncodeError::TooLong)?;
+    write(message, body).map_err(|_| EncodeError::TooLong)?;
+    check_values(info, body).map_err(EncodeError::Value)?;
+    if let Some(profile) = info.protection {
+        profile.protect(info.id, counter, data);
+    }
+    let id = StandardId::new(info.id).ok_or(EncodeError::TooLong)?;
+    let frame = if info.is_fd() {
+        CanFrame::fd(id, data, true)
+    } else {
+        CanFrame::classical(id, data)
+    };
+    frame.ok_or(EncodeError::TooLong)
+}
+
+/// Message of a frame. Bit rate switch and error state indicator belong to the link and do not matter.
+///
+/// # Errors
+/// The frame is not one that [`encode`] makes; [`DecodeError`] names the first check it fails.
+pub fn decode(frame: &CanFrame) -> Result<Received, DecodeError> {
+    let Id::Standard(id) = frame.id() else {
+        return Err(DecodeError::UnknownId);
+    };
+    let info = MessageInfo::of(id.as_raw()).ok_or(DecodeError::UnknownId)?;
+    if frame.is_remote() || frame.is_fd() != info.is_fd() {
+        return Err(DecodeError::WrongKind);
+    }
+    let data = frame.data();
+    if info.content == Content::EStop && data.is_empty() {
+        let estop = EStop {
+            reason: EStopReason::UNSPECIFIED,
+            counter: 0,
+        };
+        return Ok(Received {
+            message: Message::EStop(estop),
+            counter: None,
+        });
+    }
+    if data.len() != info.len {
+        return Err(DecodeError::WrongLength {
+            found: data.len(),
+            expected: info.len,
+        });
+    }
+    let (body, counter) = match info.protection {
+        None => (data, None),
+        Some(profile) => {
+            let (body, counter) = profile.check(info.id, data).ok_or(DecodeError::Crc)?;
+            if counter > profile.counter_max() {
+                return Err(DecodeError::NotCanonical);
+            }
+            (body, Some(counter))
+        }
+    };
+    let message = read(info.content, body).map_err(|_| DecodeError::Malformed)?;
+    // Postcard's output followed by zeros is the one body this message has.
+    let mut canonical = [0; FD_MAX];
+    write(&message, &mut canonical).map_err(|_| DecodeError::Malformed)?;
+    if canonical.get(..body.len()) != Some(body) {
+        return Err(DecodeError::NotCanonical);
+    }
+    check_values(info, body).map_err(DecodeError::Value)?;
+    Ok(Received { message, counter })
+}
+
+const fn info_of(message: &Message) -> &'static MessageInfo {
+    match message {
+        Message::Nmt(_) => &table::NMT,
+        Message::EStop(_) => &table::ESTOP,
+        Message::Emergency(node, _) => table::emergency(*node),
+        Message::Feedback(_) => &table::FEEDBACK,
+        Message::Command(_) => &table::COMMAND,
+        Message::Motion(_) => &table::MOTION,
+        Message::State(_) => &table::STATE,
+        Message::MotionReply(_) => &table::MOTION_REPLY,
+        Message::ParameterReply(server, _) => table::parameter_reply(*server),
+        Message::ParameterRequest(server, _) => table::parameter_request(*server),
+        Message::Heartbeat(node, _) => table::heartbeat(*node),
+    }
+}
+
+fn write(message: &Message, body: &mut [u8]) -> postcard::Result<()> {
+    fn put<T: Serialize>(value: &T, body: &mut [u8]) -> postcard::Result<()> {
+        postcard::to_slice(value, body).map(|_| ())
+    }
+    match message {
+        Message::Nmt(nmt) => put(nmt, body),
+        Message::EStop(estop) => put(estop, body),
+        Message::Emergency(_, emergency) => put(emergency, body),
+        Message::Feedback(feedback) => put(feedback, body),
+        Message::Command(command) => put(command, body),
+        Message::Motion(motion) => put(motion, body),
+        Message::State(state) => put(state, body),
+        Message::MotionReply(reply) => put(reply, body),
+        Message::ParameterReply(_, reply) => put(reply, body),
+        Message::ParameterRequest(_, request) => put(request, body),
+        Message::Heartbeat(_, heartbeat) => put(heartbeat, body),
+    }
+}
+
+fn read(content: Content, body: &[u8]) -> postcard::Result<Message> {
+    fn take<'a, T: Deserialize<'a>>(body: &'a [u8]) -> postcard::Result<T> {
+        postcard::take_from_bytes(body).map(|(value, _)| value)
+    }
+    Ok(match content {
+        Content::Nmt => Message::Nmt(take(body)?),
+        Content::EStop => Message::EStop(take(body)?),
+        Content::Emergency(node) => Message::Emergency(node, take(body)?),
+        Content::Feedback => Message::Feedback(take(body)?),
+        Content::Command => Message::Command(take(body)?),
+        Content::Motion => Message::Motion(take(body)?),
+        Content::State => Message::State(take(body)?),
+        Content::MotionReply => Message::MotionReply(take(body)?),
+        Content::ParameterReply(server) => Message::ParameterReply(server, take(body)?),
+        Content::ParameterRequest(server) => Message::ParameterRequest(server, take(body)?),
+        Content::Heartbeat(node) => Message::Heartbeat(node, take(body)?),
+    })
+}
+
+/// The table's ranges, applied to the bytes: the sender asks before it sends, the receiver before it believes.
+fn check_values(info: &MessageInfo, body: &[u8]) -> Result<(), ValueError> {
+    let mut selected = None;
+    for signal in info.signals {
+        if signal.when.is_some() && signal.when != selected {
+            continue;
+        }
+        let field = body.get(signal.offset..signal.end()).unwrap_or_default();
+        match signal.kind {
+            Kind::Selector(_) => selected = field.first().copied(),
+            Kind::F32 { min, max } => {
+                for (bytes, &(element, _)) in field.as_chunks().0.iter().zip(signal.elements) {
+                    let value = f32::from_le_bytes(*bytes);
+                    let signal = signal.name;
+                    if !value.is_finite() {
+                        return Err(ValueError::NotFinite { signal, element });
+                    }
+                    if !(min..=max).contains(&value) {
+                        return Err(ValueError::OutOfRange {
+                            signal,
+                            element,
+                            value,
+                            min,
+                            max,
+                        });
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+impl fmt::Display for ValueError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite { signal, element } => write!(f, "{signal} {element} is not finite"),
+            Self::OutOfRange {
+                signal,
+                element,
+                value,
+                min,
+                max,
+            } => {
+                write!(
+                    f,
+                    "{signal} {element} is {value}, allowed is {min} to {max}"
+                )
+            }
+        }
+    }
+}
+
+impl fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Value(value) => value.fmt(f),
+            Self::TooLong => f.write_str("message is longer than its table entry"),
+        }
+    }
+}
+
+impl fmt::Display for DecodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnknownId => f.write_str("identifier of no message"),
+            Self::WrongKind => f.write_str("wrong frame format"),
+            Self::WrongLength { found, expected } => {
+                write!(f, "{found} bytes, expected are {expected}")
+            }
+            Self::Crc => f.write_str("end-to-end CRC is wrong"),
+            Self::Malformed => f.write_str("code or bit without meaning"),
+            Self::NotCanonical => f.write_str("padding or encoding of no sender of ours"),
+            Self::Value(value) => value.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for ValueError {}
+impl core::error::Error for EncodeError {}
+impl core::error::Error for DecodeError {}

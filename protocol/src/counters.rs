@@ -1,0 +1,78 @@
+//! Received frames that were not used, counted by cause.
+
+use crate::codec::{DecodeError, ValueError};
+use crate::e2e::Verdict;
+
+/// Counts by cause; each stays at its greatest value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Counters {
+    /// Identifier of no message.
+    pub unknown_id: u16,
+    /// Wrong frame format.
+    pub wrong_kind: u16,
+    /// Wrong length.
+    pub wrong_length: u16,
+    /// Wrong end-to-end CRC.
+    pub crc: u16,
+    /// Code or bit without meaning.
+    pub malformed: u16,
+    /// Padding or encoding of no sender of ours.
+    pub not_canonical: u16,
+    /// Float that is none.
+    pub not_finite: u16,
+    /// Float out of its range.
+    pub out_of_range: u16,
+    /// Received a second time.
+    pub duplicate: u16,
+    /// Older than one received before.
+    pub stale: u16,
+    /// Never received, as the counter of the next one told. Not a frame dropped: not in [`Self::dropped`].
+    pub lost: u16,
+}
+
+impl Counters {
+    /// Counts a frame that decoding refused.
+    pub const fn refuse(&mut self, error: &DecodeError) {
+        let count = match error {
+            DecodeError::UnknownId => &mut self.unknown_id,
+            DecodeError::WrongKind => &mut self.wrong_kind,
+            DecodeError::WrongLength { .. } => &mut self.wrong_length,
+            DecodeError::Crc => &mut self.crc,
+            DecodeError::Malformed => &mut self.malformed,
+            DecodeError::NotCanonical => &mut self.not_canonical,
+            DecodeError::Value(ValueError::NotFinite { .. }) => &mut self.not_finite,
+            DecodeError::Value(ValueError::OutOfRange { .. }) => &mut self.out_of_range,
+        };
+        *count = count.saturating_add(1);
+    }
+
+    /// Counts what the counter of a frame told.
+    pub const fn judge(&mut self, verdict: Verdict) {
+        match verdict {
+            Verdict::Initial | Verdict::Fresh => {}
+            Verdict::Lost(frames) => self.lost = self.lost.saturating_add(frames as u16),
+            Verdict::Duplicate => self.duplicate = self.duplicate.saturating_add(1),
+            Verdict::Stale(_) => self.stale = self.stale.saturating_add(1),
+        }
+    }
+
+    /// Frames received and dropped, whatever the cause.
+    #[must_use]
+    pub fn dropped(&self) -> u16 {
+        [
+            self.unknown_id,
+            self.wrong_kind,
+            self.wrong_length,
+            self.crc,
+            self.malformed,
+            self.not_canonical,
+            self.not_finite,
+            self.out_of_range,
+            self.duplicate,
+            self.stale,
+        ]
+        .into_iter()
+        .fold(0, u16::saturating_add)
+    }
+}

@@ -1,0 +1,173 @@
+//! End-to-end protection: a counter and a CRC inside the payload.
+//!
+//! The bus CRC guards the wire; this one guards everything between two applications: drivers, mailboxes, gateways,
+//! memory. The CAN identifier goes into the CRC as data id without being sent again, so a frame that turns up on another
+//! identifier is refused. The CRC stands last and big-endian: only in that position does the code word keep the
+//! polynomial's guarantee that every burst up to the width of the CRC is found.
+//!
+//! Layout: payload, zero padding, counter, CRC. The order of the CRC's input: data id (big-endian), then the frame's
+//! bytes up to the CRC.
+
+use crc::{CRC_8_AUTOSAR, CRC_16_IBM_3740, Crc};
+
+const CRC_8: Crc<u8> = Crc::<u8>::new(&CRC_8_AUTOSAR);
+const CRC_16: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
+
+/// Which counter and CRC a frame carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Profile {
+    /// Classical frames: 4-bit counter in the low half of a byte, `CRC_8_AUTOSAR` (polynomial 2Fh; all errors of up to
+    /// three bits found in up to 119 bits).
+    Classical,
+    /// FD frames: 8-bit counter, `CRC_16_IBM_3740` (polynomial 1021h; all errors of up to three bits found in up to
+    /// 32 751 bits).
+    Fd,
+}
+
+impl Profile {
+    /// Bytes that counter and CRC take at the end of a frame.
+    #[must_use]
+    pub const fn overhead(self) -> usize {
+        match self {
+            Self::Classical => 2,
+            Self::Fd => 3,
+        }
+    }
+
+    /// Greatest counter value; the next is 0. One less than a power of two.
+    #[must_use]
+    pub const fn counter_max(self) -> u8 {
+        match self {
+            Self::Classical => 0x0F,
+            Self::Fd => 0xFF,
+        }
+    }
+
+    /// Writes the counter, reduced to its width, and the CRC over the last bytes of `frame`. A frame too short to hold
+    /// them stays as it is.
+    pub fn protect(self, data_id: u16, counter: u8, frame: &mut [u8]) {
+        let counter = counter & self.counter_max();
+        match self {
+            Self::Classical => {
+                if let Some((covered, crc)) = frame.split_last_chunk_mut::<1>()
+                    && let Some(last) = covered.last_mut()
+                {
+                    *last = counter;
+                    *crc = [crc8(data_id, covered)];
+                }
+            }
+            Self::Fd => {
+                if let Some((covered, crc)) = frame.split_last_chunk_mut::<2>()
+                    && let Some(last) = covered.last_mut()
+                {
+                    *last = counter;
+                    *crc = crc16(data_id, covered).to_be_bytes();
+                }
+            }
+        }
+    }
+
+    /// Splits a frame into payload (with its padding) and counter byte, or `None` if the CRC is not that of the
+    /// frame and data id, or the frame too short to hold it.
+    #[must_use]
+    pub fn check(self, data_id: u16, frame: &[u8]) -> Option<(&[u8], u8)> {
+        let covered = match self {
+            Self::Classical => {
+                let (covered, &[crc]) = frame.split_last_chunk()?;
+                (crc == crc8(data_id, covered)).then_some(covered)
+            }
+            Self::Fd => {
+                let (covered, &crc) = frame.split_last_chunk()?;
+                (u16::from_be_bytes(crc) == crc16(data_id, covered)).then_some(covered)
+            }
+        }?;
+        let (&counter, payload) = covered.split_last()?;
+        Some((payload, counter))
+    }
+}
+
+fn crc8(data_id: u16, bytes: &[u8]) -> u8 {
+    let mut digest = CRC_8.digest();
+    digest.update(&data_id.to_be_bytes());
+    digest.update(bytes);
+    digest.finalize()
+}
+
+fn crc16(data_id: u16, bytes: &[u8]) -> u16 {
+    let mut digest = CRC_16.digest();
+    digest.update(&data_id.to_be_bytes());
+    digest.update(bytes);
+    digest.finalize()
+}
+
+/// What the counter of a received frame says about its place in the sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Verdict {
+    /// First frame since the start or a reset: nothing to compare with, so its age is unknown. It may be a replay; do
+    /// not act on an edge it carries.
+    Initial,
+    /// The next one.
+    Fresh,
+    /// New, after this many lost frames.
+    Lost(u8),
+    /// The one before, again: drop it.
+    Duplicate,
+    /// Older than the newest by this many frames: late, reordered or replayed. Drop it.
+    Stale(u8),
+}
+
+impl Verdict {
+    /// Whether the frame is newer than all before.
+    #[must_use]
+    pub const fn is_new(self) -> bool {
+        matches!(self, Self::Initial | Self::Fresh | Self::Lost(_))
+    }
+}
+
+/// Judges the counters of one identifier.
+///
+/// Half of the counter's range counts as ahead, the other half as behind. A run of lost frames longer than half the
+/// range therefore looks stale: by then the receiver's watchdog must have expired, and the caller [resets](Self::reset).
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Receiver {
+    profile: Profile,
+    newest: Option<u8>,
+}
+
+impl Receiver {
+    /// Receiver that has seen nothing.
+    #[must_use]
+    pub const fn new(profile: Profile) -> Self {
+        Self {
+            profile,
+            newest: None,
+        }
+    }
+
+    /// Forgets the sequence, as after a watchdog has expired or the peer has started again.
+    pub const fn reset(&mut self) {
+        self.newest = None;
+    }
+
+    /// Judges the counter of a frame whose CRC is right. Only a new frame moves the sequence on.
+    #[must_use]
+    pub fn judge(&mut self, counter: u8) -> Verdict {
+        let max = self.profile.counter_max();
+        let verdict = match self.newest {
+            None => Verdict::Initial,
+            Some(newest) => match counter.wrapping_sub(newest) & max {
+                0 => Verdict::Duplicate,
+                1 => Verdict::Fresh,
+                ahead if ahead <= max / 2 => Verdict::Lost(ahead - 1),
+                ahead => Verdict::Stale(max - ahead + 1),
+            },
+        };
+        if verdict.is_new() {
+            self.newest = Some(counter & max);
+        }
+        verdict
+    }
+}

@@ -1,0 +1,222 @@
+//! The fields of every message, byte by byte, as the [`table`](crate::table) lists them.
+
+use crate::messages::{
+    Cause, Compensation, ControlWord, DriveStatus, Law, LimitFlags, Mode, MotionRequest,
+    NmtCommand, Outcome, ParameterError, ParameterReply, ParameterRequest, RefusalReason,
+    ResetReason,
+};
+use crate::schema::{Kind, Signal};
+
+type Elements = &'static [(&'static str, &'static str)];
+
+/// One number with this unit.
+macro_rules! one {
+    ($unit:literal) => {
+        &[("", $unit)]
+    };
+}
+
+/// One number a motor, with this unit.
+macro_rules! motors {
+    ($unit:literal) => {
+        &[
+            ("shoulder", $unit),
+            ("elbow", $unit),
+            ("lift", $unit),
+            ("wrist", $unit),
+        ]
+    };
+}
+
+const JOINTS: Elements = &[
+    ("shoulder", "rad"),
+    ("elbow", "rad"),
+    ("lift", "m"),
+    ("wrist", "rad"),
+];
+const POSE: Elements = &[("x", "m"), ("y", "m"), ("z", "m"), ("yaw", "rad")];
+
+const ANY: Kind = range(f32::MIN, f32::MAX);
+/// More than any joint or Cartesian coordinate of a robot this size, in rad or m.
+const COORDINATE: Kind = range(-100.0, 100.0);
+const FRACTION: Kind = range(0.0, 1.0);
+const CAUSE: Kind = Kind::Code(Cause::CODES);
+const MODE: Kind = Kind::Code(Mode::CODES);
+
+const fn range(min: f32, max: f32) -> Kind {
+    Kind::F32 { min, max }
+}
+
+const fn signal(name: &'static str, offset: usize, kind: Kind, elements: Elements) -> Signal {
+    Signal {
+        name,
+        offset,
+        kind,
+        elements,
+        when: None,
+    }
+}
+
+/// A signal present while the selector is `tag`.
+const fn when(
+    tag: u8,
+    name: &'static str,
+    offset: usize,
+    kind: Kind,
+    elements: Elements,
+) -> Signal {
+    Signal {
+        name,
+        offset,
+        kind,
+        elements,
+        when: Some(tag),
+    }
+}
+
+/// Network management.
+pub const NMT: &[Signal] = &[
+    signal("command", 0, Kind::Code(NmtCommand::CODES), one!("")),
+    signal("node", 1, Kind::U8, one!("")),
+];
+
+/// Emergency stop.
+pub const ESTOP: &[Signal] = &[
+    signal("reason", 0, Kind::U8, one!("")),
+    signal("counter", 1, Kind::U8, one!("")),
+];
+
+/// Emergency.
+pub const EMERGENCY: &[Signal] = &[
+    signal("code", 0, Kind::U16, one!("")),
+    signal("register", 2, Kind::U8, one!("")),
+    signal("cause", 3, CAUSE, one!("")),
+    signal("data", 4, Kind::U32, one!("")),
+];
+
+/// Feedback of the drives.
+pub const FEEDBACK: &[Signal] = &[
+    signal("sample", 0, Kind::U32, one!("")),
+    signal("status", 4, Kind::Flags8(DriveStatus::NAMES), one!("")),
+    signal("position", 5, Kind::I32, motors!("count")),
+    // About three times the speed of the motors (6000 rpm).
+    signal("velocity", 21, range(-2000.0, 2000.0), motors!("rad/s")),
+    signal("torque", 37, Kind::I16, motors!("0.1 %")),
+];
+
+/// Command to the drives.
+pub const COMMAND: &[Signal] = &[
+    signal("sample", 0, Kind::U32, one!("")),
+    signal("control", 4, Kind::Flags8(ControlWord::NAMES), one!("")),
+    // About twice the peak torque of the largest motor.
+    signal("torque", 5, range(-20.0, 20.0), motors!("N m")),
+];
+
+/// Request of the operator.
+pub const MOTION: &[Signal] = &[
+    signal("sequence", 0, Kind::U8, one!("")),
+    signal("request", 1, Kind::Selector(MotionRequest::NAMES), one!("")),
+    when(4, "joint_target", 2, COORDINATE, JOINTS),
+    when(4, "joint_speed", 18, FRACTION, one!("")),
+    when(5, "line_target", 2, COORDINATE, POSE),
+    when(5, "line_speed", 18, FRACTION, one!("")),
+    when(6, "jump_target", 2, COORDINATE, POSE),
+    when(6, "jump_top", 18, COORDINATE, one!("m")),
+    when(6, "jump_clearance", 22, range(0.0, 1.0), one!("m")),
+    when(6, "jump_speed", 26, FRACTION, one!("")),
+    when(7, "payload_mass", 2, range(0.0, 100.0), one!("kg")),
+    when(
+        7,
+        "payload_com",
+        6,
+        range(-1.0, 1.0),
+        &[("x", "m"), ("y", "m"), ("z", "m")],
+    ),
+    when(
+        7,
+        "payload_inertia",
+        18,
+        range(0.0, 10.0),
+        &[("xx", "kg m2"), ("yy", "kg m2"), ("zz", "kg m2")],
+    ),
+    when(8, "law", 2, Kind::Code(Law::CODES), one!("")),
+    when(
+        8,
+        "compensation",
+        3,
+        Kind::Code(Compensation::CODES),
+        one!(""),
+    ),
+    when(9, "bandwidth", 2, range(0.0, 1000.0), one!("rad/s")),
+    when(9, "damping", 6, range(0.0, 10.0), one!("")),
+    when(9, "observer", 10, range(0.0, 1000.0), one!("rad/s")),
+];
+
+/// Report of the controller.
+pub const STATE: &[Signal] = &[
+    signal("mode", 0, MODE, one!("")),
+    signal("cause", 1, CAUSE, one!("")),
+    signal("limits", 2, Kind::Flags16(LimitFlags::NAMES), one!("")),
+    signal("queue", 4, Kind::U8, one!("")),
+    signal("completed", 5, Kind::U8, one!("")),
+    signal("overruns", 6, Kind::U16, one!("")),
+    signal("rejected", 8, Kind::U16, one!("")),
+    signal("worst_tick", 10, Kind::U32, one!("")),
+    signal("law", 14, Kind::Code(Law::CODES), one!("")),
+    signal(
+        "compensation",
+        15,
+        Kind::Code(Compensation::CODES),
+        one!(""),
+    ),
+    signal("tracking_error", 16, ANY, JOINTS),
+];
+
+/// Answer to a request.
+pub const MOTION_REPLY: &[Signal] = &[
+    signal("sequence", 0, Kind::U8, one!("")),
+    signal("outcome", 1, Kind::Selector(Outcome::NAMES), one!("")),
+    when(1, "reason", 2, Kind::Code(RefusalReason::CODES), one!("")),
+    when(1, "axis", 3, Kind::U8, one!("")),
+    when(1, "value", 4, ANY, one!("")),
+    when(1, "limit", 8, ANY, one!("")),
+];
+
+/// Answer of a parameter server.
+pub const PARAMETER_REPLY: &[Signal] = &[
+    signal("reply", 0, Kind::Selector(ParameterReply::NAMES), one!("")),
+    when(0, "value_index", 1, Kind::U16, one!("")),
+    when(0, "value", 3, ANY, one!("")),
+    when(0, "value_lower", 7, ANY, one!("")),
+    when(0, "value_upper", 11, ANY, one!("")),
+    when(1, "error_index", 1, Kind::U16, one!("")),
+    when(1, "error", 3, Kind::Code(ParameterError::CODES), one!("")),
+    when(1, "error_limit", 4, ANY, one!("")),
+    when(2, "hello_schema", 1, Kind::U32, one!("")),
+    when(2, "hello_build", 5, Kind::U32, one!("")),
+    when(2, "hello_profile", 9, Kind::U8, one!("")),
+];
+
+/// Request to a parameter server.
+pub const PARAMETER_REQUEST: &[Signal] = &[
+    signal(
+        "request",
+        0,
+        Kind::Selector(ParameterRequest::NAMES),
+        one!(""),
+    ),
+    when(0, "get_index", 1, Kind::U16, one!("")),
+    when(1, "set_index", 1, Kind::U16, one!("")),
+    when(1, "set_value", 3, ANY, one!("")),
+    when(2, "list_from", 1, Kind::U16, one!("")),
+    when(3, "hello_schema", 1, Kind::U32, one!("")),
+    when(3, "hello_build", 5, Kind::U32, one!("")),
+    when(3, "hello_profile", 9, Kind::U8, one!("")),
+];
+
+/// Heartbeat.
+pub const HEARTBEAT: &[Signal] = &[
+    signal("state", 0, MODE, one!("")),
+    signal("cause", 1, CAUSE, one!("")),
+    signal("reset", 2, Kind::Code(ResetReason::CODES), one!("")),
+];

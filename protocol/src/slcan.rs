@@ -1,0 +1,349 @@
+//! Serial line CAN: the ASCII protocol of Lawicel's CAN232, with the usual letters for FD.
+//!
+//! One line is one command or one frame, ended by a carriage return; BEL refuses. Frames are `t` and `T` (data), `r`
+//! and `R` (remote), `d` and `D` (FD), `b` and `B` (FD with bit rate switch), small letters for 11-bit identifiers,
+//! followed by identifier (3 or 8 hex digits), data length code (1) and data. There is no place for the error state
+//! indicator: it is lost. Hex digits are written in capitals and read in either case, as the Linux driver does.
+
+use core::fmt;
+
+use crate::frame::{
+    CLASSICAL_MAX, CanFrame, ExtendedId, FD_MAX, FrameKind, Id, StandardId, fd_length_of_dlc,
+};
+
+/// Longest line: letter, 29-bit identifier, length code, 64 bytes, carriage return.
+pub const MAX_LINE: usize = 1 + 8 + 1 + 2 * FD_MAX + 1;
+
+/// Ends every line; alone it acknowledges.
+pub const CR: u8 = b'\r';
+/// Refuses the line before it.
+pub const BEL: u8 = 0x07;
+
+/// What one line says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Line {
+    /// Nothing: acknowledgement from an adapter; from a host, a way to end what stood in the line before.
+    Empty,
+    /// Refusal (BEL).
+    Refused,
+    /// A frame.
+    Frame(CanFrame),
+    /// `O`: take part in the bus.
+    Open,
+    /// `L`: take part in the bus, listening only.
+    Listen,
+    /// `C`: leave the bus.
+    Close,
+    /// `S0` to `S8`: nominal bit rate; 8 is 1 Mbit/s.
+    Bitrate(u8),
+    /// `Y0` to `Y9`: data bit rate; 5 is 5 Mbit/s.
+    DataBitrate(u8),
+    /// `V`: ask for the version.
+    Version,
+    /// `Vhhss`: hardware and software version.
+    VersionIs([u8; 2]),
+    /// `N`: ask for the serial number.
+    SerialNumber,
+    /// `F`: ask for the status flags.
+    Status,
+}
+
+/// Why a line says nothing. It is dropped up to its carriage return; the next line is read afresh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SlcanError {
+    /// No command begins with this byte.
+    UnknownCommand(u8),
+    /// The line is longer or shorter than the command and its length code say.
+    WrongLength,
+    /// The byte at this place, counted from 0, is no hex digit.
+    NotHex {
+        /// Place.
+        at: usize,
+    },
+    /// The identifier has more than 11 or 29 bits.
+    IdOutOfRange(u32),
+    /// The number is more than the command allows.
+    OutOfRange(u8),
+    /// No line has more than [`MAX_LINE`] bytes.
+    TooLong,
+}
+
+impl fmt::Display for SlcanError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnknownCommand(byte) => write!(f, "no command begins with {byte:#04x}"),
+            Self::WrongLength => f.write_str("line too long or too short for its command"),
+            Self::NotHex { at } => write!(f, "no hex digit at place {at}"),
+            Self::IdOutOfRange(id) => write!(f, "identifier {id:#x} has too many bits"),
+            Self::OutOfRange(digit) => write!(f, "digit {digit} is more than the command allows"),
+            Self::TooLong => write!(f, "line of more than {MAX_LINE} bytes"),
+        }
+    }
+}
+
+impl core::error::Error for SlcanError {}
+
+/// Takes bytes one by one, in fixed memory, and gives lines. Any input is allowed.
+#[derive(Clone, Debug)]
+pub struct Parser {
+    line: [u8; MAX_LINE - 1],
+    /// Bytes of the line so far, kept or not.
+    len: usize,
+}
+
+impl Default for Parser {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Parser {
+    /// Parser at the start of a line.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            line: [0; MAX_LINE - 1],
+            len: 0,
+        }
+    }
+
+    /// Takes one byte; gives what the line says when the byte ends it.
+    pub fn push(&mut self, byte: u8) -> Option<Result<Line, SlcanError>> {
+        match byte {
+            CR => {
+                let parsed = self
+                    .line
+                    .get(..self.len)
+                    .map_or(Err(SlcanError::TooLong), parse);
+                self.len = 0;
+                Some(parsed)
+            }
+            // A refusal stands alone; whatever came before it was no line.
+            BEL => {
+                self.len = 0;
+                Some(Ok(Line::Refused))
+            }
+            _ => {
+                if let Some(place) = self.line.get_mut(self.len) {
+                    *place = byte;
+                }
+                self.len = self.len.saturating_add(1);
+                None
+            }
+        }
+    }
+}
+
+/// Reads a line without its end.
+fn parse(line: &[u8]) -> Result<Line, SlcanError> {
+    let Some((&command, rest)) = line.split_first() else {
+        return Ok(Line::Empty);
+    };
+    match command {
+        b't' | b'T' | b'r' | b'R' | b'd' | b'D' | b'b' | b'B' => {
+            frame(command, rest).map(Line::Frame)
+        }
+        b'O' => bare(rest, Line::Open),
+        b'L' => bare(rest, Line::Listen),
+        b'C' => bare(rest, Line::Close),
+        b'N' => bare(rest, Line::SerialNumber),
+        b'F' => bare(rest, Line::Status),
+        b'S' => digit(rest, 8).map(Line::Bitrate),
+        b'Y' => digit(rest, 9).map(Line::DataBitrate),
+        b'V' if rest.is_empty() => Ok(Line::Version),
+        b'V' => {
+            let (digits, &[]) = rest
+                .split_first_chunk::<4>()
+                .ok_or(SlcanError::WrongLength)?
+            else {
+                return Err(SlcanError::WrongLength);
+            };
+            let version = number(digits, 1)?;
+            Ok(Line::VersionIs([(version >> 8) as u8, version as u8]))
+        }
+        _ => Err(SlcanError::UnknownCommand(command)),
+    }
+}
+
+fn bare(rest: &[u8], line: Line) -> Result<Line, SlcanError> {
+    if rest.is_empty() {
+        Ok(line)
+    } else {
+        Err(SlcanError::WrongLength)
+    }
+}
+
+fn digit(rest: &[u8], max: u8) -> Result<u8, SlcanError> {
+    let &[digit] = rest else {
+        return Err(SlcanError::WrongLength);
+    };
+    let value = nibble(digit, 1)?;
+    if value <= max {
+        Ok(value)
+    } else {
+        Err(SlcanError::OutOfRange(value))
+    }
+}
+
+fn frame(command: u8, rest: &[u8]) -> Result<CanFrame, SlcanError> {
+    let extended = command.is_ascii_uppercase();
+    let id_digits = if extended { 8 } else { 3 };
+    let (id, rest) = rest
+        .split_at_checked(id_digits)
+        .ok_or(SlcanError::WrongLength)?;
+    let (&dlc, data) = rest.split_first().ok_or(SlcanError::WrongLength)?;
+    let raw = number(id, 1)?;
+    let id = if extended {
+        ExtendedId::new(raw).map(Id::Extended)
+    } else {
+        u16::try_from(raw)
+            .ok()
+            .and_then(StandardId::new)
+            .map(Id::Standard)
+    }
+    .ok_or(SlcanError::IdOutOfRange(raw))?;
+    let dlc_at = 1 + id_digits;
+    let dlc = nibble(dlc, dlc_at)?;
+    let fd = matches!(command.to_ascii_lowercase(), b'd' | b'b');
+    if !fd && usize::from(dlc) > CLASSICAL_MAX {
+        return Err(SlcanError::OutOfRange(dlc));
+    }
+    let remote = command.eq_ignore_ascii_case(&b'r');
+    let len = if remote {
+        0
+    } else {
+        fd_length_of_dlc(dlc).unwrap_or(0)
+    };
+    if data.len() != 2 * len {
+        return Err(SlcanError::WrongLength);
+    }
+    let mut bytes = [0; FD_MAX];
+    for (k, (byte, &[high, low])) in bytes.iter_mut().zip(data.as_chunks().0).enumerate() {
+        let at = dlc_at + 1 + 2 * k;
+        *byte = nibble(high, at)? << 4 | nibble(low, at + 1)?;
+    }
+    let bytes = bytes.get(..len).unwrap_or_default();
+    if remote {
+        CanFrame::remote(id, usize::from(dlc))
+    } else if fd {
+        CanFrame::fd(id, bytes, command.eq_ignore_ascii_case(&b'b'))
+    } else {
+        CanFrame::classical(id, bytes)
+    }
+    .ok_or(SlcanError::WrongLength)
+}
+
+/// Number of at most 8 hex digits, of which the first stands at this place of the line.
+fn number(digits: &[u8], at: usize) -> Result<u32, SlcanError> {
+    digits
+        .iter()
+        .enumerate()
+        .try_fold(0, |number, (k, &digit)| {
+            Ok(number << 4 | u32::from(nibble(digit, at + k)?))
+        })
+}
+
+fn nibble(digit: u8, at: usize) -> Result<u8, SlcanError> {
+    match digit {
+        b'0'..=b'9' => Ok(digit - b'0'),
+        b'a'..=b'f' => Ok(digit - b'a' + 10),
+        b'A'..=b'F' => Ok(digit - b'A' + 10),
+        _ => Err(SlcanError::NotHex { at }),
+    }
+}
+
+/// One line ready to send, its end included.
+#[derive(Clone, Copy, Debug)]
+pub struct Text {
+    buffer: [u8; MAX_LINE],
+    len: usize,
+}
+
+impl Text {
+    const fn new() -> Self {
+        Self {
+            buffer: [0; MAX_LINE],
+            len: 0,
+        }
+    }
+
+    fn byte(&mut self, byte: u8) {
+        if let Some(place) = self.buffer.get_mut(self.len) {
+            *place = byte;
+            self.len += 1;
+        }
+    }
+
+    fn hex(&mut self, number: u32, digits: u32) {
+        for k in (0..digits).rev() {
+            let nibble = (number >> (4 * k)) as u8 & 0x0F;
+            self.byte(if nibble < 10 {
+                b'0' + nibble
+            } else {
+                b'A' + nibble - 10
+            });
+        }
+    }
+
+    fn letter_and_digit(&mut self, letter: u8, digit: u8) {
+        self.byte(letter);
+        self.hex(u32::from(digit), 1);
+    }
+
+    fn frame(&mut self, frame: &CanFrame) {
+        let letter = match frame.kind() {
+            FrameKind::Classical { remote: false } => b't',
+            FrameKind::Classical { remote: true } => b'r',
+            FrameKind::Fd { brs: false, .. } => b'd',
+            FrameKind::Fd { brs: true, .. } => b'b',
+        };
+        if frame.is_extended() {
+            self.byte(letter.to_ascii_uppercase());
+            self.hex(frame.raw_id(), 8);
+        } else {
+            self.byte(letter);
+            self.hex(frame.raw_id(), 3);
+        }
+        self.hex(u32::from(frame.dlc()), 1);
+        for &byte in frame.data() {
+            self.hex(u32::from(byte), 2);
+        }
+    }
+
+    /// The bytes to send.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        self.buffer.get(..self.len).unwrap_or_default()
+    }
+}
+
+impl From<Line> for Text {
+    fn from(line: Line) -> Self {
+        let mut text = Self::new();
+        match line {
+            Line::Refused => {
+                text.byte(BEL);
+                return text;
+            }
+            Line::Empty => {}
+            Line::Frame(frame) => text.frame(&frame),
+            Line::Open => text.byte(b'O'),
+            Line::Listen => text.byte(b'L'),
+            Line::Close => text.byte(b'C'),
+            Line::Bitrate(rate) => text.letter_and_digit(b'S', rate),
+            Line::DataBitrate(rate) => text.letter_and_digit(b'Y', rate),
+            Line::Version => text.byte(b'V'),
+            Line::VersionIs([hardware, software]) => {
+                text.byte(b'V');
+                text.hex(u32::from(hardware), 2);
+                text.hex(u32::from(software), 2);
+            }
+            Line::SerialNumber => text.byte(b'N'),
+            Line::Status => text.byte(b'F'),
+        }
+        text.byte(CR);
+        text
+    }
+}
