@@ -144,19 +144,21 @@ impl MessageInfo {
     }
 }
 
-/// Hash of the whole message table: FNV-1a, 32 bits, computed at compile time.
-///
-/// Two nodes of one hash agree on every identifier, length, offset, type, range, unit and code. What does
-/// not change the meaning of bytes (documentation, Rust types) does not enter.
-pub const SCHEMA_HASH: u32 = {
+/// Hash of the whole message table, computed at compile time: two nodes of one hash agree on every identifier, length,
+/// offset, type, range, unit and code.
+pub const SCHEMA_HASH: u32 = schema_hash(&TABLE);
+
+/// FNV-1a, 32 bits, of message descriptions. What does not change the meaning of bytes (documentation, Rust types) does
+/// not enter.
+#[must_use]
+pub const fn schema_hash(mut messages: &[&MessageInfo]) -> u32 {
     let mut hash = Fnv1a::new();
-    let mut messages: &[&MessageInfo] = &TABLE;
     while let [info, rest @ ..] = messages {
         hash = hash.message(info);
         messages = rest;
     }
     hash.0
-};
+}
 
 /// FNV-1a (Fowler, Noll, Vo). Texts end with 0xFF, which UTF-8 does not contain, and lists with 0xFE, so that no two
 /// tables run into the same bytes.
@@ -265,5 +267,22 @@ impl Fnv1a {
             names = rest;
         }
         hash.bytes(&[0xFE])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Fnv1a;
+
+    /// Test vectors of the algorithm's authors.
+    #[test]
+    fn fnv1a_is_the_published_one() {
+        for (text, hash) in [
+            ("", 0x811C_9DC5),
+            ("a", 0xE40C_292C),
+            ("foobar", 0xBF9C_F968),
+        ] {
+            assert_eq!(Fnv1a::new().bytes(text.as_bytes()).0, hash);
+        }
     }
 }

@@ -93,6 +93,32 @@ impl MotionRequest {
         (8, "select-law"),
         (9, "set-gains"),
     ];
+
+    /// Name, lower case with hyphens.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Enable => "enable",
+            Self::Disable => "disable",
+            Self::FaultReset => "fault-reset",
+            Self::Stop => "stop",
+            Self::MoveJoint { .. } => "move-joint",
+            Self::MoveLine { .. } => "move-line",
+            Self::Jump { .. } => "jump",
+            Self::SetPayload { .. } => "set-payload",
+            Self::SelectLaw { .. } => "select-law",
+            Self::SetGains { .. } => "set-gains",
+        }
+    }
+
+    /// Whether it asks for a move, which is answered when planned and counted when completed.
+    #[must_use]
+    pub const fn is_move(&self) -> bool {
+        matches!(
+            self,
+            Self::MoveJoint { .. } | Self::MoveLine { .. } | Self::Jump { .. }
+        )
+    }
 }
 
 codes! {
