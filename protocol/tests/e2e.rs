@@ -134,14 +134,15 @@ proptest! {
 
     /// The receiver sees a count modulo 16 or 256; the oracle sees the count itself.
     #[test]
-    fn verdicts_are_those_of_an_unbounded_count(classical: bool, start in 0..1000i64, steps in prop::collection::vec(-127..=127i64, 1..200)) {
+    fn verdicts_are_those_of_an_unbounded_count(classical: bool, start in 0..1000i64, steps in prop::collection::vec(-128..=127i64, 1..200)) {
         let (profile, half) = if classical { (Profile::Classical, 8) } else { (Profile::Fd, 128) };
         let mut receiver = Receiver::new(profile);
         let wire = |count: i64| count.rem_euclid(2 * half) as u8;
         prop_assert_eq!(receiver.judge(wire(start)), Verdict::Initial);
         let mut newest = start;
         for step in steps {
-            let step = step % half;
+            // From half the range behind to one less than half ahead.
+            let step = (step + half).rem_euclid(2 * half) - half;
             let expected = match step {
                 0 => Verdict::Duplicate,
                 1 => Verdict::Fresh,

@@ -423,6 +423,12 @@ fn the_hash_sees_every_part_of_the_table() {
                     max: 2.5,
                 }
             });
+            with_signal(&|signal| {
+                signal.kind = Kind::F32 {
+                    min: -2.5,
+                    max: 1.5,
+                }
+            });
             with_signal(&|signal| signal.kind = Kind::Code(&[(0, "other")]));
             with_signal(&|signal| signal.kind = Kind::Code(&[(1, "other")]));
             with_signal(&|signal| signal.kind = Kind::Flags8(&["other"]));
