@@ -26,8 +26,17 @@
 )]
 
 pub mod arm;
+pub mod body;
+pub mod cabinet;
+pub mod controller;
 pub mod dynamics;
 pub mod jacobian;
 pub mod kinematics;
+pub mod laws;
 pub mod math;
+pub mod mode;
+pub mod monitor;
+pub mod node;
+mod self_test;
+pub mod trajectory;
 pub mod velocity;

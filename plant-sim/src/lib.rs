@@ -1,8 +1,16 @@
-//! The robot that is not there: rigid-body plant, drives, bit-timed CAN bus, traces.
+//! The robot that is not there: rigid-body plant, drives, bit-timed CAN bus, traces, and the rig that joins them with the controller.
 
 #![forbid(unsafe_code)]
 
 pub mod bus;
+mod convert;
+pub mod drives;
+pub mod metrics;
 pub mod model;
+pub mod operator;
 pub mod plant;
+pub mod rig;
+pub mod run;
+pub mod scenario;
+pub mod selection;
 pub mod trace;

@@ -1,2 +1,15 @@
-//! placeholder
-fn main() {}
+//! `plant-sim`: runs the controller against the simulated robot, and looks at results.
+
+mod cli;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match cli::main() {
+        Ok(code) => code,
+        Err(message) => {
+            eprintln!("plant-sim: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}

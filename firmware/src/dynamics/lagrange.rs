@@ -195,6 +195,18 @@ impl Lagrange {
         )
     }
 
+    /// Gradient of the kinetic energy with respect to q (N m, lift N), which is C^T qd: what the momentum `M qd` gains
+    /// besides the efforts. Zero for the shoulder, on which no inertia depends.
+    #[must_use]
+    pub fn kinetic_gradient(&self, trig: &Trig, qd: &Vector4<f32>) -> Vector4<f32> {
+        let Couplings { d12, d14, d24, .. } = self.couplings(trig);
+        let w = absolute_rates(qd);
+        let arms = d12 * w.x * w.y;
+        let arm1_tool = d14 * w.x * w.z;
+        let arm2_tool = d24 * w.y * w.z;
+        Vector4::new(0.0, arms + arm1_tool, 0.0, -(arm1_tool + arm2_tool))
+    }
+
     /// Efforts that hold the arm at rest against gravity (N m, lift N): the weight on the lift, upwards.
     #[must_use]
     pub fn gravity(&self) -> Vector4<f32> {

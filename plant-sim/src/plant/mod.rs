@@ -82,9 +82,21 @@ struct Balance {
     rates: Rates,
 }
 
+/// The step (ns) that lands a loaded axis on its friction law within a few steps.
+///
+/// The integrator is stable at any stiffness, but where friction changes over less than a thirtieth of what one step
+/// can do, an axis at rest under load only finds its place after hundreds of steps. Below 10 us that is accepted.
+fn resolvable_step(mass: &Matrix4<f64>, drive: &Drive) -> u64 {
+    let response = integrator::factor(mass).inverse().diagonal();
+    let steepest = response
+        .component_mul(&drive.friction_secant(&Vector4::zeros()))
+        .max();
+    ((30e9 / steepest) as u64).clamp(10_000, Plant::MAX_STEP_NS)
+}
+
 impl Plant {
-    /// Default longest step of integration, ns. The fastest thing it must resolve is a joint on its end stop
-    /// (400 rad/s): a tenth of a radian a step.
+    /// Longest step of integration, ns. The fastest thing it must resolve is a joint on its end stop (400 rad/s): a
+    /// tenth of a radian a step. Only a robot with extremely steep friction gets shorter steps.
     pub const MAX_STEP_NS: u64 = 250_000;
 
     /// The robot of `model` at rest at joint positions `q`.
@@ -97,6 +109,7 @@ impl Plant {
             arm,
             encoder: Encoder::new(model.drive.encoder_counts),
             stops: EndStops::new(&model.limits, &stretched.diagonal()),
+            max_step: resolvable_step(&stretched, &drive),
             drive,
             brake: Brake::new(model.limits.effort[LIFT]),
             model: model.clone(),
@@ -105,7 +118,6 @@ impl Plant {
             request: Vector4::zeros(),
             torque_enabled: false,
             now: 0,
-            max_step: Self::MAX_STEP_NS,
             ledger: Rates::zeros(),
             latched: (0, Vector4::zeros()),
         }
@@ -163,7 +175,7 @@ impl Plant {
 
     /// Integrates up to time `t` (ns). Earlier times do nothing.
     ///
-    /// Steps are [`Plant::MAX_STEP_NS`] long; the last one, and one that ends where the brake moves, are shorter.
+    /// Steps are of fixed length; the last one, and one that ends where the brake moves, are shorter.
     pub fn advance_to(&mut self, t: u64) {
         self.brake.update(self.now);
         while self.now < t {

@@ -16,7 +16,7 @@ pub struct EndStops {
 /// v / RATE (1 degree on axis 1 at full speed, 6 mm on the lift), slow enough for the integrator to resolve.
 const RATE: f64 = 400.0;
 
-/// Damping ratio on the stop: an axis leaves it with about a sixth of the speed of its arrival.
+/// Damping ratio on the stop: an axis leaves it with three tenths of the speed of its arrival.
 const DAMPING_RATIO: f64 = 0.5;
 
 impl EndStops {

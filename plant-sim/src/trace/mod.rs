@@ -71,6 +71,12 @@ impl Interface {
     /// Longest name, bytes (`IFNAMSIZ` less the terminating zero).
     pub const MAX: usize = 15;
 
+    /// The name that the simulated bus goes by.
+    pub const CAN0: Self = Self {
+        name: *b"can0\0\0\0\0\0\0\0\0\0\0\0",
+        len: 4,
+    };
+
     /// The name, or `None` if no interface can have it.
     #[must_use]
     pub fn new(name: &str) -> Option<Self> {

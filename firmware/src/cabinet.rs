@@ -1,0 +1,63 @@
+//! Pins of the drive cabinet, through embedded-hal: brake, safe torque off, stack light, e-stop.
+//!
+//! The pins show what the mode says and nothing else. Every output is written on every call, so
+//! that a glitch lasts one sample; wiring is fail-safe: a low pin brakes and takes torque away.
+
+use embedded_hal::digital::{InputPin, OutputPin};
+use protocol::messages::Mode;
+
+use crate::mode;
+
+/// Outputs and inputs of the cabinet.
+#[derive(Debug)]
+pub struct Cabinet<Brake, Torque, Green, Red, EStop> {
+    /// High opens the brake.
+    pub brake: Brake,
+    /// High permits torque (the STO input of the drives).
+    pub torque: Torque,
+    /// Stack light: ready or running.
+    pub green: Green,
+    /// Stack light: fault or emergency stop.
+    pub red: Red,
+    /// High while the emergency-stop chain is closed.
+    pub estop: EStop,
+}
+
+/// A pin did not do what it was told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PinFault;
+
+impl<Brake, Torque, Green, Red, EStop> Cabinet<Brake, Torque, Green, Red, EStop>
+where
+    Brake: OutputPin,
+    Torque: OutputPin,
+    Green: OutputPin,
+    Red: OutputPin,
+    EStop: InputPin,
+{
+    /// Writes all outputs for `mode`; `brake_open` is the brake bit of the last command.
+    ///
+    /// # Errors
+    /// [`PinFault`] if any pin failed; the others are written all the same.
+    pub fn show(&mut self, mode: Mode, brake_open: bool) -> Result<(), PinFault> {
+        let alarm = matches!(mode, Mode::FaultReaction | Mode::Fault | Mode::EStop);
+        let torque = mode::is_powered(mode) || brake_open;
+        let results = [
+            self.brake.set_state(brake_open.into()).is_ok(),
+            self.torque.set_state(torque.into()).is_ok(),
+            self.green.set_state((!alarm).into()).is_ok(),
+            self.red.set_state(alarm.into()).is_ok(),
+        ];
+        if results.into_iter().all(|ok| ok) {
+            Ok(())
+        } else {
+            Err(PinFault)
+        }
+    }
+
+    /// Whether the emergency-stop chain is open. A pin that cannot be read counts as open.
+    pub fn estop_pressed(&mut self) -> bool {
+        !self.estop.is_high().unwrap_or(false)
+    }
+}

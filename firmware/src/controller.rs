@@ -1,0 +1,711 @@
+//! One sample of control: drive readings in, motor torques out.
+//!
+//! ```text
+//! readings -> joints -> monitor -> mode -> reference -> control law -> torque limits -> torques
+//! ```
+//!
+//! There is one call and it is total: every input gives an output, the work is bounded, nothing
+//! is allocated and no clock is read. Time is the number of samples.
+
+use heapless::Deque;
+use nalgebra::Vector4;
+use protocol::messages::{
+    Cause, Compensation, ControlWord, DriveStatus, Law, Mode, MotionReply, MotionRequest, Outcome,
+    Refusal, RefusalReason,
+};
+
+use crate::arm::{ArmModel, Payload};
+use crate::body::Body;
+use crate::kinematics::{Pose, Trig};
+use crate::laws::{Gains, Memory, Selection, Situation};
+use crate::math::clamp;
+use crate::mode::{self, Event};
+use crate::monitor::{Finding, Monitor, MonitorLimits};
+use crate::trajectory::capacity::Capacity;
+use crate::trajectory::clock::Clock;
+use crate::trajectory::planner::{Planner, Request, Target};
+use crate::trajectory::{Reference, Trajectory};
+
+/// Planned moves and requests that may wait, each.
+pub const QUEUE: usize = 4;
+/// Samples that a gap in the feedback may span before the arm is stopped.
+pub const MAX_GAP: u32 = 5;
+
+/// Everything a controller is told before it starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// The robot.
+    pub arm: ArmModel,
+    /// What the flange carries at the start.
+    pub payload: Payload,
+    /// Control law at the start.
+    pub selection: Selection,
+    /// Sampling period, s.
+    pub period: f32,
+    /// Time from a sample until its command acts at the drives, s.
+    pub command_delay: f32,
+    /// Time the brake takes to open or close, s.
+    pub brake_delay: f32,
+    /// What stops the arm.
+    pub monitor: MonitorLimits,
+}
+
+impl Config {
+    /// Bench settings for `arm`: computed torque with observer, sampled every `period` seconds.
+    pub fn new(arm: ArmModel, period: f32) -> Self {
+        Self {
+            arm,
+            payload: Payload::NONE,
+            selection: Selection {
+                law: Law::ComputedTorqueJoint,
+                compensation: Compensation::Observer,
+                gains: Gains {
+                    bandwidth: 120.0,
+                    damping: 1.0,
+                    observer: 60.0,
+                },
+            },
+            period,
+            command_delay: 0.25e-3,
+            brake_delay: 0.03,
+            monitor: MonitorLimits::DEFAULT,
+        }
+    }
+}
+
+/// Drive readings of one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Readings {
+    /// Samples since the last readings: 1, or more where feedback was lost.
+    pub steps: u32,
+    /// State of the drives.
+    pub status: DriveStatus,
+    /// Motor encoder counts.
+    pub counts: [i32; 4],
+    /// Motor speeds, rad/s, means over the last sample.
+    pub speed: Vector4<f32>,
+    /// Motor torques, N m, means over the last sample.
+    pub torque: Vector4<f32>,
+}
+
+/// What the drives are to do until the next command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Actions {
+    /// Torque enable, brake, stop flags.
+    pub control: ControlWord,
+    /// Motor torques, N m.
+    pub torque: [f32; 4],
+}
+
+/// Progress of switching off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shutdown {
+    /// Coming to rest on the path.
+    Stopping,
+    /// The brake closes; torque still holds the arm. Samples left.
+    Closing(u32),
+    /// Torque is off.
+    Off,
+}
+
+/// The controller of one arm.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    config: Config,
+    body: Body,
+    mode: Mode,
+    cause: Cause,
+    alarm: Option<Finding>,
+    /// Samples until the brake has opened.
+    opening: u32,
+    shutdown: Shutdown,
+    planner: Planner,
+    requests: Deque<Request, QUEUE>,
+    moves: Deque<Trajectory, QUEUE>,
+    clock: Clock,
+    /// Where the last planned move ends: the next one starts there.
+    plan_end: Vector4<f32>,
+    /// The reference of the last sample, as handed to the law.
+    reference: Reference,
+    memory: Memory,
+    monitor: Monitor,
+    saturated: Vector4<f32>,
+    limited: u16,
+    error: Vector4<f32>,
+    completed: u8,
+    replies: Deque<MotionReply, { 2 * QUEUE }>,
+}
+
+impl Controller {
+    /// A controller in self-test. The model should have passed [`ArmModel::validate`]; one that
+    /// has not never leaves self-test.
+    pub fn new(config: Config) -> Self {
+        Self {
+            body: Body::new(&config.arm, &config.payload),
+            config,
+            mode: Mode::SelfTest,
+            cause: Cause::None,
+            alarm: None,
+            opening: 0,
+            shutdown: Shutdown::Off,
+            planner: Planner::new(),
+            requests: Deque::new(),
+            moves: Deque::new(),
+            clock: Clock::default(),
+            plan_end: Vector4::zeros(),
+            reference: Reference::rest(Vector4::zeros()),
+            memory: Memory::new(),
+            monitor: Monitor::default(),
+            saturated: Vector4::zeros(),
+            limited: 0,
+            error: Vector4::zeros(),
+            completed: 0,
+            replies: Deque::new(),
+        }
+    }
+
+    /// State of the cabinet.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Latched cause of the last fault.
+    pub fn cause(&self) -> Cause {
+        self.cause
+    }
+
+    /// A fault that the peers have not been told of; each is handed out once.
+    pub fn take_alarm(&mut self) -> Option<Finding> {
+        self.alarm.take()
+    }
+
+    /// The robot.
+    pub fn arm(&self) -> &ArmModel {
+        &self.config.arm
+    }
+
+    /// Law, compensation and gains in use.
+    pub fn selection(&self) -> &Selection {
+        &self.config.selection
+    }
+
+    /// Reference of the last sample.
+    pub fn reference(&self) -> &Reference {
+        &self.reference
+    }
+
+    /// Reference minus measured position of the last sample.
+    pub fn following_error(&self) -> &Vector4<f32> {
+        &self.error
+    }
+
+    /// Bit i: axis i was at its torque limit in the last sample.
+    pub fn limited(&self) -> u16 {
+        self.limited
+    }
+
+    /// Moves planned or waiting.
+    pub fn queued(&self) -> u8 {
+        let planning = usize::from(!self.planner.is_idle());
+        u8::try_from(self.moves.len() + self.requests.len() + planning).unwrap_or(u8::MAX)
+    }
+
+    /// Number of the last move that was completed.
+    pub fn completed(&self) -> u8 {
+        self.completed
+    }
+
+    /// An answer to an operator that is due.
+    pub fn take_reply(&mut self) -> Option<MotionReply> {
+        self.replies.pop_front()
+    }
+
+    /// Something happened outside: self-test passed, peer found or lost, emergency stop.
+    pub fn event(&mut self, event: Event, cause: Cause) {
+        let Some(next) = mode::transition(self.mode, event) else {
+            return;
+        };
+        if cause != Cause::None {
+            self.latch(cause);
+        }
+        let was_powered = mode::is_powered(self.mode) || self.shutdown != Shutdown::Off;
+        self.enter(next, was_powered);
+    }
+
+    /// Keeps the first cause until a reset, and has it reported.
+    pub fn latch(&mut self, cause: Cause) {
+        if self.cause == Cause::None {
+            self.cause = cause;
+            self.alarm.get_or_insert(Finding {
+                cause,
+                axis: None,
+                value: 0.0,
+            });
+        }
+    }
+
+    /// Answers a request without looking at it further.
+    pub fn refuse(&mut self, sequence: u8, refusal: Refusal) {
+        self.reply(sequence, Outcome::Refused(refusal));
+    }
+
+    /// Takes an operator's request. Answers follow by [`Controller::take_reply`]: at once, or for
+    /// a move when it has been planned.
+    pub fn request(&mut self, sequence: u8, request: &MotionRequest) {
+        match self.judge(sequence, request) {
+            Ok(Answer::Now) => self.reply(sequence, Outcome::Accepted),
+            Ok(Answer::WhenPlanned) => {}
+            Err(refusal) => self.reply(sequence, Outcome::Refused(refusal)),
+        }
+    }
+
+    /// One sample. Worst case: one trajectory evaluation, one control law,
+    /// [`crate::trajectory::planner::SAMPLES_PER_TICK`] planning samples.
+    pub fn step(&mut self, readings: &Readings) -> Actions {
+        let drive = &self.body.drive;
+        let q = drive.joint_angle(&drive.motor_angle_of_counts(&readings.counts));
+        let qd = drive.joint_speed(&readings.speed);
+        let measured_torque = drive.joint_torque(&readings.torque);
+
+        if readings.steps > MAX_GAP {
+            self.fail(Finding {
+                cause: Cause::FeedbackLost,
+                axis: None,
+                value: readings.steps as f32,
+            });
+        }
+        self.watch(readings.status, &q, &qd);
+        self.count_brake(readings.steps);
+        if !self.is_holding() {
+            // No torque: follow the arm, so that switching on starts where it stands.
+            self.reference = Reference::rest(q);
+            self.plan_end = q;
+            self.error = Vector4::zeros();
+            self.limited = 0;
+            self.saturated = Vector4::zeros();
+            return Actions {
+                control: self.control_word(),
+                torque: [0.0; 4],
+            };
+        }
+        self.plan();
+        let (reference, ahead) = self.advance(readings.steps.min(MAX_GAP));
+        self.reference = reference;
+        self.error = reference.q - q;
+
+        let trig = Trig::new(&q);
+        let period = self.config.period;
+        let situation = Situation {
+            arm: &self.config.arm,
+            body: &self.body,
+            trig: &trig,
+            q,
+            qd,
+            torque: measured_torque,
+            reference,
+            mean_qd: mean_velocity(&reference, period),
+            ahead,
+            period,
+            saturated: self.saturated,
+        };
+        if self.mode == Mode::Enabling || matches!(self.shutdown, Shutdown::Closing(_)) {
+            // The brake holds: what it carries must not be taken for a disturbance.
+            self.memory = Memory::new();
+        }
+        let torque = self.config.selection.torque(&situation, &mut self.memory);
+        Actions {
+            control: self.control_word(),
+            torque: self.limit(&torque),
+        }
+    }
+
+    // --- requests -------------------------------------------------------------------------
+
+    fn judge(&mut self, sequence: u8, request: &MotionRequest) -> Result<Answer, Refusal> {
+        let idle = matches!(self.mode, Mode::Ready | Mode::PreOperational)
+            || (self.mode == Mode::Enabled && self.queued() == 0);
+        let answer = match request {
+            MotionRequest::Enable => return self.operate(Event::Enable),
+            MotionRequest::Disable if self.queued() > 0 => {
+                return Err(Refusal::because(RefusalReason::Moving));
+            }
+            MotionRequest::Disable => return self.operate(Event::Disable),
+            MotionRequest::FaultReset => {
+                if self.shutdown != Shutdown::Off {
+                    return Err(Refusal::because(RefusalReason::Moving));
+                }
+                return self.operate(Event::Reset);
+            }
+            MotionRequest::Stop => {
+                self.drop_queued();
+                if self.mode == Mode::Enabled {
+                    // Planned, not begun: there is nothing to brake.
+                    self.moves.clear();
+                    self.plan_end = self.reference.q;
+                }
+                self.event(Event::Stop, Cause::None);
+                Answer::Now
+            }
+            MotionRequest::MoveJoint { target, speed } => {
+                self.enqueue(sequence, Target::Joints(Vector4::from(*target)), *speed)?
+            }
+            MotionRequest::MoveLine { target, speed } => {
+                self.enqueue(sequence, Target::Line(pose(target)), *speed)?
+            }
+            MotionRequest::Jump {
+                target,
+                top,
+                clearance,
+                speed,
+            } => {
+                let target = Target::Jump {
+                    pose: pose(target),
+                    top: *top,
+                    clearance: *clearance,
+                };
+                self.enqueue(sequence, target, *speed)?
+            }
+            _ if !idle => return Err(Refusal::because(RefusalReason::Moving)),
+            MotionRequest::SetPayload { mass, com, inertia } => {
+                let limit = self.config.arm.payload_max;
+                if *mass > limit {
+                    return Err(Refusal::value(RefusalReason::PayloadTooHeavy, *mass, limit));
+                }
+                self.config.payload = Payload {
+                    mass: *mass,
+                    com: (*com).into(),
+                    inertia: (*inertia).into(),
+                };
+                self.body = Body::new(&self.config.arm, &self.config.payload);
+                self.memory = Memory::new();
+                Answer::Now
+            }
+            MotionRequest::SelectLaw { law, compensation } => {
+                self.config.selection.law = *law;
+                self.config.selection.compensation = *compensation;
+                self.memory = Memory::new();
+                Answer::Now
+            }
+            MotionRequest::SetGains {
+                bandwidth,
+                damping,
+                observer,
+            } => {
+                let gains = Gains {
+                    bandwidth: *bandwidth,
+                    damping: *damping,
+                    observer: *observer,
+                };
+                gains.check(self.config.period)?;
+                self.config.selection.gains = gains;
+                self.memory = Memory::new();
+                Answer::Now
+            }
+        };
+        Ok(answer)
+    }
+
+    fn operate(&mut self, event: Event) -> Result<Answer, Refusal> {
+        if mode::transition(self.mode, event).is_none() {
+            return Err(Refusal::because(RefusalReason::WrongState));
+        }
+        self.event(event, Cause::None);
+        Ok(Answer::Now)
+    }
+
+    fn enqueue(&mut self, sequence: u8, target: Target, speed: f32) -> Result<Answer, Refusal> {
+        match self.mode {
+            Mode::Enabled | Mode::Moving => {}
+            Mode::Ready | Mode::Enabling => {
+                return Err(Refusal::because(RefusalReason::NotEnabled));
+            }
+            _ => return Err(Refusal::because(RefusalReason::WrongState)),
+        }
+        let request = Request {
+            sequence,
+            target,
+            speed,
+        };
+        self.requests
+            .push_back(request)
+            .map_err(|_| Refusal::because(RefusalReason::QueueFull))?;
+        Ok(Answer::WhenPlanned)
+    }
+
+    fn reply(&mut self, sequence: u8, outcome: Outcome) {
+        // The outbox is as long as everything that can be waiting for an answer.
+        let _ = self.replies.push_back(MotionReply { sequence, outcome });
+    }
+
+    // --- modes ----------------------------------------------------------------------------
+
+    fn enter(&mut self, next: Mode, was_powered: bool) {
+        let brake = self.brake_samples();
+        match next {
+            Mode::Enabling => {
+                self.opening = brake;
+                self.memory = Memory::new();
+                self.monitor.reset();
+            }
+            Mode::Disabling => self.shutdown = Shutdown::Closing(brake),
+            Mode::FaultReaction | Mode::EStop => {
+                self.drop_queued();
+                self.shutdown = match self.shutdown {
+                    Shutdown::Off if was_powered => Shutdown::Stopping,
+                    already => already,
+                };
+            }
+            Mode::Fault => {
+                self.drop_queued();
+                self.moves.clear();
+                self.shutdown = Shutdown::Off;
+            }
+            Mode::PreOperational => self.cause = Cause::None,
+            _ => {}
+        }
+        self.mode = next;
+    }
+
+    fn fail(&mut self, finding: Finding) {
+        if mode::transition(self.mode, Event::Fail).is_some() {
+            self.alarm = Some(finding);
+            self.event(Event::Fail, finding.cause);
+        }
+    }
+
+    fn watch(&mut self, status: DriveStatus, q: &Vector4<f32>, qd: &Vector4<f32>) {
+        if !mode::is_powered(self.mode) {
+            return;
+        }
+        let error = self.reference.q - q;
+        // The reference of the last sample: at most one sample of motion older than `q`.
+        let moved = self.reference.qd * self.config.period;
+        if let Some(finding) = self.monitor.check(
+            &self.config.arm,
+            &self.config.monitor,
+            status,
+            q,
+            qd,
+            &(error + moved),
+        ) {
+            self.fail(finding);
+        }
+    }
+
+    /// Whether torque holds or moves the arm.
+    fn is_holding(&self) -> bool {
+        mode::is_powered(self.mode) || self.shutdown != Shutdown::Off
+    }
+
+    fn brake_samples(&self) -> u32 {
+        (self.config.brake_delay / self.config.period) as u32 + 1
+    }
+
+    fn count_brake(&mut self, steps: u32) {
+        if self.mode == Mode::Enabling {
+            self.opening = self.opening.saturating_sub(steps);
+            if self.opening == 0 {
+                self.event(Event::BrakeOpen, Cause::None);
+            }
+        }
+        if let Shutdown::Closing(left) = self.shutdown {
+            let left = left.saturating_sub(steps);
+            self.shutdown = Shutdown::Closing(left);
+            if left == 0 {
+                self.shutdown = Shutdown::Off;
+                self.event(Event::BrakeClosed, Cause::None);
+            }
+        }
+    }
+
+    fn control_word(&self) -> ControlWord {
+        let holding = self.is_holding();
+        let closing = matches!(self.shutdown, Shutdown::Closing(_));
+        ControlWord::EMPTY
+            .with(ControlWord::TORQUE_ENABLE, holding)
+            .with(ControlWord::BRAKE_RELEASE, holding && !closing)
+            .with(ControlWord::QUICK_STOP, self.is_stopping())
+            .with(ControlWord::ESTOP, self.mode == Mode::EStop)
+    }
+
+    // --- motion ---------------------------------------------------------------------------
+
+    fn is_stopping(&self) -> bool {
+        self.mode == Mode::QuickStop || self.shutdown == Shutdown::Stopping
+    }
+
+    /// Refuses what waits to be planned; planned moves go when the arm has come to rest.
+    fn drop_queued(&mut self) {
+        let stopped = Outcome::Refused(Refusal::because(RefusalReason::Stopped));
+        if let Some(sequence) = self.planner.cancel() {
+            self.reply(sequence, stopped);
+        }
+        while let Some(request) = self.requests.pop_front() {
+            self.reply(request.sequence, stopped);
+        }
+    }
+
+    fn plan(&mut self) {
+        let capacity = Capacity {
+            arm: &self.config.arm,
+            body: &self.body,
+        };
+        if self.planner.is_idle() {
+            if self.moves.is_full() {
+                return;
+            }
+            let Some(request) = self.requests.pop_front() else {
+                return;
+            };
+            if let Err(refusal) = self
+                .planner
+                .begin(&self.config.arm, &request, &self.plan_end)
+            {
+                self.reply(request.sequence, Outcome::Refused(refusal));
+            }
+            return;
+        }
+        match self.planner.work(&capacity) {
+            None => {}
+            Some(Ok(trajectory)) => {
+                self.plan_end = trajectory.end;
+                let _ = self.moves.push_back(trajectory);
+                self.reply(trajectory.sequence, Outcome::Accepted);
+            }
+            Some(Err(refusal)) => {
+                let sequence = self.planner.sequence();
+                self.reply(sequence, Outcome::Refused(refusal));
+            }
+        }
+    }
+
+    /// The reference at this sample and in the middle of the time its command will act.
+    fn advance(&mut self, steps: u32) -> (Reference, Reference) {
+        let period = self.config.period;
+        if self.mode == Mode::Enabled && !self.moves.is_empty() {
+            self.clock = Clock::default();
+            self.event(Event::Start, Cause::None);
+        }
+        let stopping = self.is_stopping();
+        let reference = match self.moves.front() {
+            Some(trajectory) if self.mode != Mode::Enabled => {
+                if !self.clock.is_stopped() {
+                    for _ in 0..steps {
+                        self.clock.advance(period);
+                    }
+                }
+                let t = self.clock.time(period);
+                let ended = t >= trajectory.duration();
+                // A verified path stays in reach; should arithmetic disagree, the arm holds.
+                let planned = trajectory
+                    .at(&self.config.arm, t)
+                    .unwrap_or(Reference::rest(self.reference.q));
+                if stopping {
+                    self.clock.brake(
+                        &planned,
+                        &trajectory.braking,
+                        &self.config.arm.limits,
+                        period,
+                    );
+                }
+                let braked = self.clock.apply(&planned);
+                let sequence = trajectory.sequence;
+                let stopped = stopping && (self.clock.is_stopped() || ended);
+                if stopped {
+                    self.come_to_rest(&braked.q);
+                    Reference::rest(braked.q)
+                } else {
+                    if ended {
+                        self.finish(sequence);
+                    }
+                    braked
+                }
+            }
+            _ => {
+                if stopping {
+                    let here = self.reference.q;
+                    self.come_to_rest(&here);
+                }
+                Reference::rest(self.reference.q)
+            }
+        };
+        let lead = self.config.command_delay + 0.5 * period;
+        (reference, extrapolate(&reference, lead))
+    }
+
+    fn finish(&mut self, sequence: u8) {
+        self.moves.pop_front();
+        self.completed = sequence;
+        self.clock = Clock::default();
+        if self.moves.is_empty() {
+            self.event(Event::Arrived, Cause::None);
+        }
+    }
+
+    fn come_to_rest(&mut self, q: &Vector4<f32>) {
+        self.moves.clear();
+        self.plan_end = *q;
+        self.clock = Clock::default();
+        if self.mode == Mode::QuickStop {
+            self.event(Event::AtRest, Cause::None);
+        } else {
+            self.shutdown = Shutdown::Closing(self.brake_samples());
+        }
+    }
+
+    /// Cuts joint torques to the limits of joints and motors and turns them into motor torques.
+    fn limit(&mut self, torque: &Vector4<f32>) -> [f32; 4] {
+        let arm = &self.config.arm;
+        let effort = &arm.limits.effort;
+        let joint = torque.zip_map(effort, |t, limit| clamp(t, -limit, limit));
+        let wanted = self.body.drive.motor_torque(&joint);
+        let motor = wanted.zip_map(&arm.drive.motor_torque_limit, |t, limit| {
+            clamp(t, -limit, limit)
+        });
+        let cut = |asked: f32, given: f32| {
+            if asked > given {
+                1.0
+            } else if asked < given {
+                -1.0
+            } else {
+                0.0
+            }
+        };
+        let joint_cut = torque.zip_map(&joint, cut);
+        let motor_cut = wanted.zip_map(&motor, cut);
+        self.saturated = joint_cut.zip_map(&motor_cut, |j, m| if j == 0.0 { m } else { j });
+        self.limited = self
+            .saturated
+            .iter()
+            .zip([1u16, 2, 4, 8])
+            .filter(|(cut, _)| **cut != 0.0)
+            .fold(0, |flags, (_, bit)| flags | bit);
+        [motor.x, motor.y, motor.z, motor.w]
+    }
+}
+
+enum Answer {
+    Now,
+    WhenPlanned,
+}
+
+fn pose(target: &[f32; 4]) -> Pose {
+    let [x, y, z, yaw] = *target;
+    Pose { x, y, z, yaw }
+}
+
+/// Mean velocity over the sample that ends at `reference`, exact for constant jerk.
+fn mean_velocity(reference: &Reference, period: f32) -> Vector4<f32> {
+    reference.qd - reference.qdd * (0.5 * period) + reference.qddd * (period * period / 6.0)
+}
+
+/// The reference `lead` seconds on, exact for constant jerk.
+fn extrapolate(reference: &Reference, lead: f32) -> Reference {
+    let Reference { q, qd, qdd, qddd } = *reference;
+    Reference {
+        q: q + qd * lead + qdd * (0.5 * lead * lead),
+        qd: qd + qdd * lead + qddd * (0.5 * lead * lead),
+        qdd: qdd + qddd * lead,
+        qddd,
+    }
+}

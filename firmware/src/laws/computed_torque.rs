@@ -1,0 +1,56 @@
+//! Computed torque in joint space: tau = M(q)(qdd_d + Kd e' + Kp e) + C qd + g + friction.
+//!
+//! The tracking form of the paper's dynamic control in joint space, whose M and n are listed
+//! there and not used. Feed-forward is taken where the command will act, not where the
+//! measurement was: half a hold and the way over the bus later.
+
+use nalgebra::Vector4;
+use protocol::messages::Compensation;
+
+use super::{Gains, Memory, Situation};
+
+/// Joint torques.
+pub fn torque(
+    situation: &Situation<'_>,
+    gains: &Gains,
+    compensation: Compensation,
+    memory: &mut Memory,
+) -> Vector4<f32> {
+    let error = situation.position_error();
+    let mut acceleration = situation.ahead.qdd
+        + situation.velocity_error() * gains.derivative()
+        + error * gains.proportional();
+    if compensation == Compensation::Integral {
+        acceleration += memory.integrate(&error, situation) * gains.integral();
+    }
+    realise(situation, &acceleration, gains, compensation, memory)
+}
+
+/// The torques that give the joints `acceleration` in spite of what the model says acts on them
+/// and, with the observer, of what it does not say.
+pub(super) fn realise(
+    situation: &Situation<'_>,
+    acceleration: &Vector4<f32>,
+    gains: &Gains,
+    compensation: Compensation,
+    memory: &mut Memory,
+) -> Vector4<f32> {
+    let body = situation.body;
+    let mass = body.mass_matrix(situation.trig);
+    let gravity = body.lagrange.gravity();
+    // Friction of the planned motion: that of the measured one would chatter around rest.
+    let friction = body.drive.friction(&situation.ahead.qd);
+    let bias = body
+        .lagrange
+        .bias(situation.trig, &situation.velocity_ahead());
+    let torque = mass * acceleration + bias + gravity + friction;
+    if compensation == Compensation::Observer {
+        let known = gravity + friction;
+        let disturbance = memory
+            .observer
+            .update(situation, &mass, &known, gains.observer);
+        torque - disturbance
+    } else {
+        torque
+    }
+}

@@ -1,0 +1,13 @@
+//! Kinematic control in joint space: qd = qd_d + lambda (q_d - q).
+//!
+//! The paper prints `lambda q''` for `lambda q~`: an unstable equation without position feedback.
+
+use nalgebra::Vector4;
+
+use super::{Gains, Memory, Situation, velocity_loop};
+
+/// Joint torques of the velocity loop that follows the law's velocities.
+pub fn torque(situation: &Situation<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
+    let command = situation.mean_qd + situation.position_error() * velocity_loop::outer_gain(gains);
+    velocity_loop::torque(&command, situation, gains, memory)
+}

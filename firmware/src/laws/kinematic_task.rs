@@ -1,0 +1,20 @@
+//! Kinematic control in task space: qd = J^-1 (mu_d' + r (mu_d - mu)), mu = (x, y, z, yaw).
+//!
+//! The paper prints `r mu''` for `r mu~` and inverts a 6x4 matrix; here J is the 4x4 task
+//! Jacobian, its inverse is damped near the stretched elbow, and the yaw error is wrapped.
+
+use nalgebra::Vector4;
+
+use super::{Gains, Memory, Situation, computed_torque_task, velocity_loop};
+use crate::jacobian::Jacobian;
+
+/// Joint torques of the velocity loop that follows the law's velocities.
+pub fn torque(situation: &Situation<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
+    let jacobian = Jacobian::new(&situation.arm.geometry, situation.trig);
+    let error = computed_torque_task::pose_error(situation);
+    // Away from the singularity J^-1 J qd_d is qd_d; near it both parts are damped alike.
+    let velocity =
+        jacobian.task_velocity(&situation.mean_qd) + error * velocity_loop::outer_gain(gains);
+    let command = jacobian.joint_speed_damped(&velocity);
+    velocity_loop::torque(&command, situation, gains, memory)
+}

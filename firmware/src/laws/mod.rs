@@ -1,0 +1,193 @@
+//! The control laws of the paper, corrected, one file each, selectable at run time.
+//!
+//! | law | paper | what it needs |
+//! |---|---|---|
+//! | [`kinematic_joint`] | kinematic control, joint space | inner velocity loop |
+//! | [`kinematic_task`] | kinematic control, task space | Jacobian, inner velocity loop |
+//! | [`pid`] | named, not given | nominal inertias |
+//! | [`pd_gravity`] | dynamic control, joint space | g(q), nominal inertias |
+//! | [`computed_torque`] | dynamic control, joint space, tracking form | M, C, g, friction |
+//! | [`computed_torque_task`] | eq 49 | the same and the Jacobian |
+//!
+//! All are pure functions of a [`Situation`] plus a [`Memory`] (integrals and observer). Outputs
+//! are joint torques: N m, N m, N, N m.
+
+pub mod computed_torque;
+pub mod computed_torque_task;
+pub mod kinematic_joint;
+pub mod kinematic_task;
+pub mod observer;
+pub mod pd_gravity;
+pub mod pid;
+mod velocity_loop;
+
+use nalgebra::Vector4;
+use protocol::messages::{Compensation, Law, Refusal, RefusalReason};
+
+use crate::arm::ArmModel;
+use crate::body::Body;
+use crate::kinematics::Trig;
+use crate::trajectory::Reference;
+use observer::MomentumObserver;
+
+/// Largest damping ratio an operator may ask for.
+const MAX_DAMPING: f32 = 5.0;
+
+/// Closed-loop gains, the same three numbers for every law and every robot: they are turned into
+/// accelerations, and inertia turns those into torque.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// Natural frequency of the error dynamics, rad/s.
+    pub bandwidth: f32,
+    /// Damping ratio of the error dynamics.
+    pub damping: f32,
+    /// Corner frequency of the disturbance observer, or 1 / integral time, rad/s.
+    pub observer: f32,
+}
+
+impl Gains {
+    /// Refuses gains that cannot be stable at this sampling period.
+    ///
+    /// # Errors
+    /// [`RefusalReason::OutOfRange`] with the gain and its bound: a bandwidth or observer corner
+    /// above a quarter radian a sample leaves no phase for the delays of sampling and bus.
+    pub fn check(&self, period: f32) -> Result<(), Refusal> {
+        let fastest = 0.25 / period;
+        for (value, limit) in [
+            (self.bandwidth, fastest),
+            (self.damping, MAX_DAMPING),
+            (self.observer, fastest),
+        ] {
+            if !(value > 0.0 && value <= limit) {
+                return Err(Refusal::value(RefusalReason::OutOfRange, value, limit));
+            }
+        }
+        Ok(())
+    }
+
+    /// Kp, 1/s².
+    pub fn proportional(&self) -> f32 {
+        self.bandwidth * self.bandwidth
+    }
+
+    /// Kd, 1/s.
+    pub fn derivative(&self) -> f32 {
+        2.0 * self.damping * self.bandwidth
+    }
+
+    /// Ki, 1/s³.
+    pub fn integral(&self) -> f32 {
+        self.proportional() * self.observer
+    }
+}
+
+/// What a law sees in one sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Situation<'a> {
+    /// The robot.
+    pub arm: &'a ArmModel,
+    /// Its dynamics with the payload as announced.
+    pub body: &'a Body,
+    /// Sines and cosines of the measured position.
+    pub trig: &'a Trig,
+    /// Measured joint positions.
+    pub q: Vector4<f32>,
+    /// Measured joint velocities: means over the last sample, so half a sample old.
+    pub qd: Vector4<f32>,
+    /// Measured joint torques, means over the last sample.
+    pub torque: Vector4<f32>,
+    /// Reference at the sampling instant.
+    pub reference: Reference,
+    /// Reference velocity through the same filter as `qd`: compared with it without a delay.
+    pub mean_qd: Vector4<f32>,
+    /// Reference at the middle of the time in which the command will act.
+    pub ahead: Reference,
+    /// Sampling period, s.
+    pub period: f32,
+    /// Sign of the axes whose torque was cut in the last sample, 0 where none was.
+    pub saturated: Vector4<f32>,
+}
+
+impl Situation<'_> {
+    /// Position error at the sampling instant.
+    pub fn position_error(&self) -> Vector4<f32> {
+        self.reference.q - self.q
+    }
+
+    /// Measured velocity, brought forward by what the reference gains in the meantime.
+    pub fn velocity_ahead(&self) -> Vector4<f32> {
+        self.qd + (self.ahead.qd - self.mean_qd)
+    }
+
+    /// Velocity error over the last sample.
+    pub fn velocity_error(&self) -> Vector4<f32> {
+        self.mean_qd - self.qd
+    }
+}
+
+/// What a law remembers between samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Memory {
+    integral: Vector4<f32>,
+    observer: MomentumObserver,
+}
+
+impl Memory {
+    /// Nothing remembered.
+    pub fn new() -> Self {
+        Self {
+            integral: Vector4::zeros(),
+            observer: MomentumObserver::new(),
+        }
+    }
+
+    /// Adds `error` over one sample, except where the axis is saturated in that direction
+    /// (clamping anti-windup, Åström & Hägglund, *Advanced PID Control*, section 3.5). Returns
+    /// the integral.
+    fn integrate(&mut self, error: &Vector4<f32>, situation: &Situation<'_>) -> Vector4<f32> {
+        let winds_up = situation.saturated.component_mul(error).map(|x| x > 0.0);
+        self.integral += error.zip_map(
+            &winds_up,
+            |e, stop| {
+                if stop { 0.0 } else { e * situation.period }
+            },
+        );
+        self.integral
+    }
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A law, what helps it against friction and payload error, and its gains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Selection {
+    /// The law.
+    pub law: Law,
+    /// Used by the two computed-torque laws.
+    pub compensation: Compensation,
+    /// Gains.
+    pub gains: Gains,
+}
+
+impl Selection {
+    /// Joint torques for one sample.
+    pub fn torque(&self, situation: &Situation<'_>, memory: &mut Memory) -> Vector4<f32> {
+        let gains = &self.gains;
+        match self.law {
+            Law::KinematicJoint => kinematic_joint::torque(situation, gains, memory),
+            Law::KinematicTask => kinematic_task::torque(situation, gains, memory),
+            Law::Pid => pid::torque(situation, gains, memory),
+            Law::PdGravity => pd_gravity::torque(situation, gains),
+            Law::ComputedTorqueJoint => {
+                computed_torque::torque(situation, gains, self.compensation, memory)
+            }
+            Law::ComputedTorqueTask => {
+                computed_torque_task::torque(situation, gains, self.compensation, memory)
+            }
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Generalised-momentum disturbance observer (De Luca & Mattone, 2003).
+//!
+//! With p = M qd and M' = C + C^T, p' = tau + d + C^T qd - g - friction for the unknown torque d;
+//! C^T qd is the gradient of the kinetic energy with respect to q.
+//! The residual r = K (p - integral of all known terms and r) follows d as a first-order low-pass
+//! with corner K. It needs no acceleration and, since it counts the torque that the drives report
+//! and not the one that was asked for, it does not wind up when an axis saturates.
+
+use nalgebra::{Matrix4, Vector4};
+
+use super::Situation;
+
+/// State of the observer.
+#[derive(Clone, Copy, Debug)]
+pub struct MomentumObserver {
+    expected: Vector4<f32>,
+    residual: Vector4<f32>,
+    /// Mean torque of the sample before the last one.
+    previous_torque: Vector4<f32>,
+    started: bool,
+}
+
+impl MomentumObserver {
+    /// An observer that has seen nothing.
+    pub fn new() -> Self {
+        Self {
+            expected: Vector4::zeros(),
+            residual: Vector4::zeros(),
+            previous_torque: Vector4::zeros(),
+            started: false,
+        }
+    }
+
+    /// Estimated disturbance at the joints after one more sample, positive along +q.
+    ///
+    /// `mass` is the inertia matrix with rotors, `known` gravity plus friction. The corner is
+    /// bounded to half a radian a sample, where the discrete filter still behaves like the
+    /// continuous one.
+    pub fn update(
+        &mut self,
+        situation: &Situation<'_>,
+        mass: &Matrix4<f32>,
+        known: &Vector4<f32>,
+        corner: f32,
+    ) -> Vector4<f32> {
+        let period = situation.period;
+        let momentum = mass * situation.qd;
+        if !self.started {
+            self.started = true;
+            self.expected = momentum;
+            self.previous_torque = situation.torque;
+            return self.residual;
+        }
+        // Velocities are means over a sample and stand for its middle: between two of them act
+        // the second half of one torque sample and the first half of the next.
+        let torque = 0.5 * (situation.torque + self.previous_torque);
+        self.previous_torque = situation.torque;
+        let coriolis = situation
+            .body
+            .lagrange
+            .kinetic_gradient(situation.trig, &situation.qd);
+        self.expected += (torque + coriolis - known + self.residual) * period;
+        let corner = corner.min(0.5 / period);
+        self.residual = (momentum - self.expected) * corner;
+        self.residual
+    }
+}
+
+impl Default for MomentumObserver {
+    fn default() -> Self {
+        Self::new()
+    }
+}

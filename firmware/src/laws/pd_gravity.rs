@@ -1,0 +1,16 @@
+//! PD with gravity compensation: tau = Kp (q_d - q) + Kd (qd_d - qd) + g(q).
+//!
+//! The paper's dynamic control in joint space. Right for set points (Takegaki & Arimoto, 1981);
+//! while tracking it lags by the torque that the motion needs, which [`super::computed_torque`]
+//! adds.
+
+use nalgebra::Vector4;
+
+use super::{Gains, Situation};
+
+/// Joint torques; the gain matrices are nominal inertias times Kp and Kd.
+pub fn torque(situation: &Situation<'_>, gains: &Gains) -> Vector4<f32> {
+    let acceleration = situation.position_error() * gains.proportional()
+        + situation.velocity_error() * gains.derivative();
+    situation.body.nominal_inertia.component_mul(&acceleration) + situation.body.lagrange.gravity()
+}

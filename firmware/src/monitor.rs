@@ -1,0 +1,115 @@
+//! Watches what the drives report; limited is not failed: limits are flags, these are faults.
+
+use nalgebra::Vector4;
+use protocol::messages::{Cause, DriveStatus};
+
+use crate::arm::{ArmModel, Axis};
+
+/// Limits whose violation stops the arm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MonitorLimits {
+    /// Largest following error: rad, rad, m, rad.
+    pub following_error: Vector4<f32>,
+    /// Largest joint speed as a multiple of the arm's limit.
+    pub speed_factor: f32,
+    /// How far past its range a joint may be: rad, rad, m, rad.
+    pub range_margin: Vector4<f32>,
+    /// Samples in a row before a violation counts.
+    pub samples: u8,
+}
+
+impl MonitorLimits {
+    /// Limits for a bench: an arm that keeps them follows its path visibly well.
+    pub const DEFAULT: Self = Self {
+        following_error: Vector4::new(0.05, 0.05, 0.01, 0.2),
+        speed_factor: 1.1,
+        range_margin: Vector4::new(0.02, 0.02, 0.002, 0.05),
+        samples: 3,
+    };
+}
+
+/// Counts violations in a row.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Monitor {
+    following: u8,
+    speed: u8,
+    range: u8,
+}
+
+/// A fault with the axis and value that caused it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finding {
+    /// What is wrong.
+    pub cause: Cause,
+    /// Axis, where one is to blame.
+    pub axis: Option<Axis>,
+    /// Value found, in the unit of the axis.
+    pub value: f32,
+}
+
+impl Monitor {
+    /// Judges one sample; `error` is reference minus measured position.
+    pub fn check(
+        &mut self,
+        arm: &ArmModel,
+        limits: &MonitorLimits,
+        status: DriveStatus,
+        q: &Vector4<f32>,
+        qd: &Vector4<f32>,
+        error: &Vector4<f32>,
+    ) -> Option<Finding> {
+        if status.contains(DriveStatus::FAULT) || !status.contains(DriveStatus::ENCODER_VALID) {
+            return Some(Finding {
+                cause: Cause::DriveFault,
+                axis: None,
+                value: f32::from(status.bits()),
+            });
+        }
+        let following = first_beyond(error, &limits.following_error);
+        let speed = first_beyond(qd, &(arm.limits.velocity * limits.speed_factor));
+        let middle = 0.5 * (arm.limits.upper + arm.limits.lower);
+        let reach = 0.5 * (arm.limits.upper - arm.limits.lower) + limits.range_margin;
+        let range = first_beyond(&(q - middle), &reach);
+        let needed = limits.samples;
+        count(
+            &mut self.following,
+            following,
+            needed,
+            Cause::FollowingError,
+        )
+        .or(count(&mut self.speed, speed, needed, Cause::OverSpeed))
+        .or(count(&mut self.range, range, needed, Cause::SoftLimit))
+    }
+
+    /// Forgets the counts, for a new start.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+}
+
+fn first_beyond(value: &Vector4<f32>, limit: &Vector4<f32>) -> Option<(Axis, f32)> {
+    Axis::ALL
+        .into_iter()
+        .zip(value.iter())
+        .zip(limit.iter())
+        .find(|((_, value), limit)| value.is_nan() || value.abs() > **limit)
+        .map(|((axis, value), _)| (axis, *value))
+}
+
+fn count(
+    counter: &mut u8,
+    violation: Option<(Axis, f32)>,
+    needed: u8,
+    cause: Cause,
+) -> Option<Finding> {
+    let Some((axis, value)) = violation else {
+        *counter = 0;
+        return None;
+    };
+    *counter = counter.saturating_add(1);
+    (*counter >= needed).then_some(Finding {
+        cause,
+        axis: Some(axis),
+        value,
+    })
+}

@@ -1,0 +1,395 @@
+//! The controller on the bus: frames in, one control sample when feedback arrives, frames out.
+//!
+//! Arrival drives, a timer guards: [`Node::poll`] is called when a frame has come and at least
+//! once a sample; only feedback moves the control on, the time handed in only ages it. So
+//! lock-step, a virtual bus in real time and a real bus run one and the same path.
+
+use nalgebra::Vector4;
+use protocol::bus::Bus;
+use protocol::codec::{self, DecodeError};
+use protocol::e2e::{Profile, Receiver, Verdict};
+use protocol::messages::{
+    Cause, Command, Emergency, Feedback, Heartbeat, Hello, LimitFlags, Message, Motion,
+    MotionRequest, ParameterReply, ParameterRequest, Refusal, RefusalReason, ResetReason, Server,
+    State,
+};
+use protocol::messages::{Mode, Node as Name};
+use protocol::schema::SCHEMA_HASH;
+
+use crate::controller::{Config, Controller, Readings};
+use crate::mode::Event;
+use crate::self_test;
+
+/// Frames taken from the bus in one call; more wait for the next.
+pub const FRAMES_PER_POLL: usize = 8;
+/// Age of the feedback, µs, at which the drives count as silent: torque off, brake.
+pub const PEER_TIMEOUT_US: u64 = 100_000;
+/// Period of the state message, µs.
+const STATE_PERIOD_US: u64 = 20_000;
+/// Period of the heartbeat, µs.
+const HEARTBEAT_PERIOD_US: u64 = 100_000;
+/// Rejected, stale or duplicate feedback frames in a row that stop the arm.
+const MAX_BAD_FEEDBACK: u8 = 3;
+
+/// What a node has refused, by cause; every counter saturates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rejections {
+    /// Frames that are no message of ours or fail a check.
+    pub undecodable: u16,
+    /// Frames whose end-to-end CRC is wrong.
+    pub corrupted: u16,
+    /// Frames seen before.
+    pub duplicate: u16,
+    /// Frames older than what has been seen.
+    pub stale: u16,
+    /// Frames lost, from gaps in the counters.
+    pub lost: u16,
+    /// Frames that could not be sent.
+    pub unsent: u16,
+}
+
+impl Rejections {
+    fn total(&self) -> u16 {
+        self.undecodable
+            .saturating_add(self.corrupted)
+            .saturating_add(self.duplicate)
+            .saturating_add(self.stale)
+    }
+}
+
+/// Transmit counters, one an identifier.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counters {
+    command: u8,
+    reply: u8,
+    state: u8,
+    emergency: u8,
+    parameter: u8,
+    heartbeat: u8,
+}
+
+/// A controller with its place on the bus.
+#[derive(Clone, Debug)]
+pub struct Node {
+    controller: Controller,
+    feedback: Receiver,
+    motion: Receiver,
+    parameter: Receiver,
+    counters: Counters,
+    rejections: Rejections,
+    bad_feedback: u8,
+    /// Sample number and arrival of the newest feedback.
+    newest: Option<(u32, u64)>,
+    /// The drives were built from the same message table.
+    same_schema: bool,
+    overruns: u16,
+    next_state: u64,
+    next_heartbeat: u64,
+}
+
+impl Node {
+    /// A node in self-test.
+    pub fn new(config: Config) -> Self {
+        Self {
+            controller: Controller::new(config),
+            feedback: Receiver::new(Profile::Fd),
+            motion: Receiver::new(Profile::Fd),
+            parameter: Receiver::new(Profile::Fd),
+            counters: Counters::default(),
+            rejections: Rejections::default(),
+            bad_feedback: 0,
+            newest: None,
+            same_schema: false,
+            overruns: 0,
+            next_state: 0,
+            next_heartbeat: 0,
+        }
+    }
+
+    /// The controller, to look at.
+    pub fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// What was refused so far.
+    pub fn rejections(&self) -> &Rejections {
+        &self.rejections
+    }
+
+    /// A shell reports a tick that ended after its deadline.
+    pub fn count_overrun(&mut self) {
+        self.overruns = self.overruns.saturating_add(1);
+    }
+
+    /// Takes what has arrived, at most [`FRAMES_PER_POLL`] frames, and answers. `now` is a time
+    /// in µs that never runs backwards; where it starts does not matter.
+    pub fn poll<B: Bus>(&mut self, now: u64, bus: &mut B) {
+        if self.controller.mode() == Mode::SelfTest {
+            match self_test::run(self.controller.arm()) {
+                Ok(()) => self.controller.event(Event::SelfTestPassed, Cause::None),
+                Err(()) => self.controller.latch(Cause::SelfTest),
+            }
+        }
+        for _ in 0..FRAMES_PER_POLL {
+            let Some(frame) = bus.receive() else { break };
+            match codec::decode(&frame) {
+                Ok(received) => self.take(&received.message, received.counter, now, bus),
+                Err(error) => self.reject(error, &frame),
+            }
+        }
+        self.guard(now);
+        self.report(now, bus);
+    }
+
+    fn take<B: Bus>(&mut self, message: &Message, counter: Option<u8>, now: u64, bus: &mut B) {
+        let counter = counter.unwrap_or(0);
+        match message {
+            Message::Feedback(feedback) => {
+                let verdict = self.feedback.judge(counter);
+                if self.admit(verdict) {
+                    self.bad_feedback = 0;
+                    self.sample(feedback, now, bus);
+                } else {
+                    self.suspect(Cause::Reordered);
+                }
+            }
+            Message::Motion(motion) => {
+                let verdict = self.motion.judge(counter);
+                if self.admit(verdict) {
+                    self.motion(motion, verdict);
+                }
+            }
+            Message::EStop(_) => self.controller.event(Event::EmergencyStop, Cause::EStop),
+            Message::ParameterRequest(Server::Controller, request) => {
+                let verdict = self.parameter.judge(counter);
+                if self.admit(verdict) {
+                    self.parameter(request, bus);
+                }
+            }
+            // What other nodes tell each other, or the operator.
+            _ => {}
+        }
+    }
+
+    /// One control sample: the only place where the control moves on.
+    fn sample<B: Bus>(&mut self, feedback: &Feedback, now: u64, bus: &mut B) {
+        let steps = match self.newest {
+            None => 1,
+            Some((last, _)) => feedback.sample.wrapping_sub(last).max(1),
+        };
+        self.newest = Some((feedback.sample, now));
+        if self.controller.mode() == Mode::PreOperational && self.same_schema {
+            self.controller.event(Event::PeerReady, Cause::None);
+        }
+        let rated = self.controller.arm().drive.motor_torque_rated * 1e-3;
+        let [t1, t2, t3, t4] = feedback.torque.map(f32::from);
+        let actions = self.controller.step(&Readings {
+            steps,
+            status: feedback.status,
+            counts: feedback.position,
+            speed: Vector4::from(feedback.velocity),
+            torque: Vector4::new(t1, t2, t3, t4).component_mul(&rated),
+        });
+        let command = Command {
+            sample: feedback.sample,
+            control: actions.control,
+            torque: actions.torque,
+        };
+        let counter = self.counters.command;
+        self.counters.command = counter.wrapping_add(1);
+        self.send(&Message::Command(command), counter, bus);
+    }
+
+    fn motion(&mut self, motion: &Motion, verdict: Verdict) {
+        let edge = matches!(
+            motion.request,
+            MotionRequest::Enable | MotionRequest::FaultReset
+        );
+        // The first frame of an operator may be a replay: it must not switch anything on.
+        if edge && verdict == Verdict::Initial {
+            self.controller
+                .refuse(motion.sequence, Refusal::because(RefusalReason::WrongState));
+        } else if edge && !self.same_schema {
+            self.controller.refuse(
+                motion.sequence,
+                Refusal::because(RefusalReason::SchemaMismatch),
+            );
+        } else {
+            self.controller.request(motion.sequence, &motion.request);
+        }
+    }
+
+    fn parameter<B: Bus>(&mut self, request: &ParameterRequest, bus: &mut B) {
+        let reply = match request {
+            ParameterRequest::Hello(peer) => {
+                self.same_schema = peer.schema == SCHEMA_HASH;
+                ParameterReply::Hello(Hello {
+                    schema: SCHEMA_HASH,
+                    build: BUILD,
+                    profile: Hello::PROFILE_FD,
+                })
+            }
+            ParameterRequest::Get { index }
+            | ParameterRequest::Set { index, .. }
+            | ParameterRequest::List { from: index } => ParameterReply::Error {
+                index: *index,
+                error: protocol::messages::ParameterError::NotFound,
+                limit: 0.0,
+            },
+        };
+        let counter = self.counters.parameter;
+        self.counters.parameter = counter.wrapping_add(1);
+        self.send(
+            &Message::ParameterReply(Server::Controller, reply),
+            counter,
+            bus,
+        );
+    }
+
+    /// Counts what the counter says was lost, repeated or late; `true` for a frame to act on.
+    fn admit(&mut self, verdict: Verdict) -> bool {
+        let counter = match verdict {
+            Verdict::Initial | Verdict::Fresh => return true,
+            Verdict::Lost(frames) => {
+                self.rejections.lost = self.rejections.lost.saturating_add(u16::from(frames));
+                return true;
+            }
+            Verdict::Duplicate => &mut self.rejections.duplicate,
+            Verdict::Stale(_) => &mut self.rejections.stale,
+        };
+        *counter = counter.saturating_add(1);
+        false
+    }
+
+    fn reject(&mut self, error: DecodeError, frame: &protocol::frame::CanFrame) {
+        let corrupted = error == DecodeError::Crc;
+        let counter = if corrupted {
+            &mut self.rejections.corrupted
+        } else {
+            &mut self.rejections.undecodable
+        };
+        *counter = counter.saturating_add(1);
+        if !frame.is_extended() && frame.raw_id() == u32::from(protocol::table::FEEDBACK.id) {
+            self.suspect(if corrupted {
+                Cause::Corrupted
+            } else {
+                Cause::BadValue
+            });
+        }
+    }
+
+    /// Several bad feedback frames in a row stop the arm.
+    fn suspect(&mut self, cause: Cause) {
+        self.bad_feedback = self.bad_feedback.saturating_add(1);
+        if self.bad_feedback >= MAX_BAD_FEEDBACK {
+            self.controller.event(Event::Fail, cause);
+        }
+    }
+
+    /// Ages the feedback.
+    fn guard(&mut self, now: u64) {
+        let Some((_, arrived)) = self.newest else {
+            return;
+        };
+        if now.saturating_sub(arrived) > PEER_TIMEOUT_US {
+            self.controller.event(Event::PeerLost, Cause::PeerSilent);
+            self.newest = None;
+            self.feedback.reset();
+            self.same_schema = false;
+        }
+    }
+
+    /// What is due: replies, an emergency, state and heartbeat.
+    fn report<B: Bus>(&mut self, now: u64, bus: &mut B) {
+        while let Some(reply) = self.controller.take_reply() {
+            let counter = self.counters.reply;
+            self.counters.reply = counter.wrapping_add(1);
+            self.send(&Message::MotionReply(reply), counter, bus);
+        }
+        if let Some(alarm) = self.controller.take_alarm() {
+            let emergency = Emergency {
+                code: emergency_code(alarm.cause),
+                register: 1,
+                cause: alarm.cause,
+                data: alarm.value.to_bits(),
+            };
+            let counter = self.counters.emergency;
+            self.counters.emergency = counter.wrapping_add(1);
+            self.send(
+                &Message::Emergency(Name::Controller, emergency),
+                counter,
+                bus,
+            );
+        }
+        if now >= self.next_state {
+            self.next_state = now + STATE_PERIOD_US;
+            let state = self.state();
+            let counter = self.counters.state;
+            self.counters.state = counter.wrapping_add(1);
+            self.send(&Message::State(state), counter, bus);
+        }
+        if now >= self.next_heartbeat {
+            self.next_heartbeat = now + HEARTBEAT_PERIOD_US;
+            let heartbeat = Heartbeat {
+                state: self.controller.mode(),
+                cause: self.controller.cause(),
+                reset: ResetReason::PowerOn,
+            };
+            let counter = self.counters.heartbeat;
+            self.counters.heartbeat = counter.wrapping_add(1);
+            self.send(
+                &Message::Heartbeat(Name::Controller, heartbeat),
+                counter,
+                bus,
+            );
+        }
+    }
+
+    fn state(&self) -> State {
+        let controller = &self.controller;
+        let selection = controller.selection();
+        State {
+            mode: controller.mode(),
+            cause: controller.cause(),
+            limits: LimitFlags::from_bits(controller.limited()).unwrap_or(LimitFlags::EMPTY),
+            queue: controller.queued(),
+            completed: controller.completed(),
+            overruns: self.overruns,
+            rejected: self.rejections.total(),
+            worst_tick: 0,
+            law: selection.law,
+            compensation: selection.compensation,
+            tracking_error: (*controller.following_error()).into(),
+        }
+    }
+
+    fn send<B: Bus>(&mut self, message: &Message, counter: u8, bus: &mut B) {
+        let sent = codec::encode(message, counter)
+            .ok()
+            .and_then(|frame| bus.transmit(&frame).ok());
+        if sent.is_none() {
+            self.rejections.unsent = self.rejections.unsent.saturating_add(1);
+        }
+    }
+}
+
+/// Identifies the build in the handshake.
+const BUILD: u32 = 1;
+
+/// Emergency error code, CiA 301 table 26 and CiA 402 table 1.
+fn emergency_code(cause: Cause) -> u16 {
+    match cause {
+        Cause::None => 0x0000,
+        Cause::OverTorque => 0x8331,
+        Cause::FollowingError => 0x8611,
+        Cause::OverSpeed => 0x8481,
+        Cause::SoftLimit => 0x8500,
+        Cause::FeedbackLost | Cause::PeerSilent => 0x8130,
+        Cause::Reordered | Cause::Corrupted | Cause::BadValue => 0x8200,
+        Cause::BusOff => 0x8140,
+        Cause::DriveFault | Cause::StuckSensor => 0x7300,
+        Cause::Overrun | Cause::SelfTest | Cause::SchemaMismatch => 0x6100,
+        Cause::DuplicateNode | Cause::Babbling => 0x8100,
+        Cause::EStop => 0x9000,
+    }
+}

@@ -1,0 +1,103 @@
+//! The clock of a trajectory: runs with the samples, or is braked to a stop on the path.
+
+use nalgebra::Vector4;
+
+use super::Reference;
+use crate::arm::JointLimits;
+use crate::math::sqrt;
+
+/// Share of the jerk limit that a stop may use: the move's own jerk keeps the rest.
+const STOP_JERK_SHARE: f32 = 0.5;
+
+/// Trajectory time in whole samples plus a fraction, so that long moves keep their resolution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clock {
+    ticks: u32,
+    fraction: f32,
+    /// Clock rate: 1 in motion, 0 when stopped.
+    rate: f32,
+    /// Change of the rate, 1/s; never positive.
+    slope: f32,
+}
+
+impl Default for Clock {
+    fn default() -> Self {
+        Self {
+            ticks: 0,
+            fraction: 0.0,
+            rate: 1.0,
+            slope: 0.0,
+        }
+    }
+}
+
+impl Clock {
+    /// Time on the trajectory, s.
+    pub fn time(&self, period: f32) -> f32 {
+        (self.ticks as f32 + self.fraction) * period
+    }
+
+    /// Whether a stop has come to rest.
+    pub fn is_stopped(&self) -> bool {
+        self.rate <= 0.0
+    }
+
+    /// One sample on.
+    pub fn advance(&mut self, period: f32) {
+        let step = self.rate + 0.5 * self.slope * period;
+        self.rate = (self.rate + self.slope * period).max(0.0);
+        self.fraction += step.max(0.0);
+        if self.fraction >= 1.0 {
+            self.fraction -= 1.0;
+            self.ticks = self.ticks.saturating_add(1);
+        }
+    }
+
+    /// Chooses the next slope of a stop: as steep as no joint passes `braking` (the accelerations
+    /// the plan itself uses) and as its jerk allows, flattening towards rest. The arm stays on
+    /// its path. `reference` is the trajectory's own, before [`Clock::apply`].
+    pub fn brake(
+        &mut self,
+        reference: &Reference,
+        braking: &Vector4<f32>,
+        limits: &JointLimits,
+        period: f32,
+    ) {
+        let mut steepest = f32::MAX;
+        let mut bend = f32::MAX;
+        for (((qd, qdd), available), jerk) in reference
+            .qd
+            .iter()
+            .zip(reference.qdd.iter())
+            .zip(braking.iter())
+            .zip(limits.jerk.iter())
+        {
+            let speed = qd.abs();
+            if speed * period > f32::EPSILON {
+                let own = self.rate * self.rate * if *qd > 0.0 { *qdd } else { -*qdd };
+                steepest = steepest.min((available + own).max(0.0) / speed);
+                bend = bend.min(STOP_JERK_SHARE * jerk / speed);
+            }
+        }
+        if bend == f32::MAX {
+            // At rest on the trajectory: nothing to brake.
+            self.rate = 0.0;
+            self.slope = 0.0;
+            return;
+        }
+        let flare = sqrt(2.0 * bend * self.rate);
+        let next = (-self.slope + bend * period).min(steepest).min(flare);
+        self.slope = -next;
+    }
+
+    /// The reference as the braked clock runs through it.
+    pub fn apply(&self, reference: &Reference) -> Reference {
+        let (r, slope) = (self.rate, self.slope);
+        Reference {
+            q: reference.q,
+            qd: reference.qd * r,
+            qdd: reference.qdd * (r * r) + reference.qd * slope,
+            qddd: reference.qddd * (r * r * r) + reference.qdd * (3.0 * r * slope),
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Geometry of a move: joint positions as a function of a path coordinate `s` in 0..=1.
+
+use nalgebra::Vector4;
+
+use crate::arm::{ArmModel, Axis};
+use crate::jacobian::Jacobian;
+use crate::kinematics::{self, Elbow, IkError, Pose, Trig};
+
+/// Joint positions and their derivatives with respect to the path coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathPoint {
+    /// q(s): rad, rad, m, rad.
+    pub q: Vector4<f32>,
+    /// dq/ds.
+    pub dq: Vector4<f32>,
+    /// d²q/ds².
+    pub ddq: Vector4<f32>,
+}
+
+/// Why a point of a path cannot be reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PathError {
+    /// Outside the reach or a joint limit.
+    Unreachable(IkError),
+    /// |sin theta2| below [`MIN_SIN_ELBOW`]: a straight line would need unbounded joint speed.
+    Singular {
+        /// sin(theta2) found.
+        sin_elbow: f32,
+    },
+}
+
+/// A straight line is refused where |sin(theta2)| falls below this: there the joint speeds for a
+/// given tool speed are more than 20 times those at a square elbow.
+pub const MIN_SIN_ELBOW: f32 = 0.05;
+
+/// Geometry of a move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Path {
+    /// Straight in joint space, all axes together.
+    Joint {
+        /// Joint positions at s = 0.
+        start: Vector4<f32>,
+        /// End minus start.
+        delta: Vector4<f32>,
+    },
+    /// Straight line of the tool, yaw turning at a constant rate along it.
+    Line {
+        /// Tool pose at s = 0.
+        start: Pose,
+        /// End minus start: dx, dy, dz, dyaw.
+        delta: Vector4<f32>,
+        /// Elbow branch, kept along the whole line.
+        elbow: Elbow,
+        /// theta4 - (theta1 + theta2 - yaw): the turn of axis 4, kept along the line.
+        wrist_turns: f32,
+    },
+}
+
+impl Path {
+    /// Joint positions and derivatives at `s`.
+    ///
+    /// # Errors
+    /// Only a line can fail: beyond reach, or too close to the stretched elbow.
+    pub fn at(&self, arm: &ArmModel, s: f32) -> Result<PathPoint, PathError> {
+        match self {
+            Self::Joint { start, delta } => Ok(PathPoint {
+                q: start + delta * s,
+                dq: *delta,
+                ddq: Vector4::zeros(),
+            }),
+            Self::Line {
+                start,
+                delta,
+                elbow,
+                wrist_turns,
+            } => {
+                let pose = Pose {
+                    x: start.x + delta.x * s,
+                    y: start.y + delta.y * s,
+                    z: start.z + delta.z * s,
+                    yaw: start.yaw + delta.w * s,
+                };
+                let mut q = kinematics::solve(&arm.geometry, &pose, *elbow)
+                    .map_err(PathError::Unreachable)?;
+                q.w = q.x + q.y - pose.yaw + wrist_turns;
+                let trig = Trig::new(&q);
+                let singular = PathError::Singular { sin_elbow: trig.s2 };
+                if trig.s2.abs() < MIN_SIN_ELBOW {
+                    return Err(singular);
+                }
+                // x' is constant, x'' = 0: q' = J^-1 x', q'' = -J^-1 (dJ/ds) q'. The Jacobian's
+                // rate along the path has the same form as its rate in time, with q' for qd.
+                let jacobian = Jacobian::new(&arm.geometry, &trig);
+                let dq = jacobian.joint_speed(delta).ok_or(singular)?;
+                let ddq = jacobian.joint_speed(&-jacobian.bias(&dq)).ok_or(singular)?;
+                Ok(PathPoint { q, dq, ddq })
+            }
+        }
+    }
+}
+
+/// First joint limit that `q` violates.
+///
+/// # Errors
+/// [`IkError::Limit`] with the axis, the value and the limit passed.
+pub fn check_limits(arm: &ArmModel, q: &Vector4<f32>) -> Result<(), IkError> {
+    let limits = &arm.limits;
+    for (((axis, value), lower), upper) in Axis::ALL
+        .into_iter()
+        .zip(q.iter())
+        .zip(limits.lower.iter())
+        .zip(limits.upper.iter())
+    {
+        if !value.is_finite() {
+            return Err(IkError::NotFinite);
+        }
+        let limit = if value < lower { lower } else { upper };
+        if value < lower || value > upper {
+            return Err(IkError::Limit {
+                axis,
+                value: *value,
+                limit: *limit,
+            });
+        }
+    }
+    Ok(())
+}

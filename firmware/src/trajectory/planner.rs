@@ -1,0 +1,526 @@
+//! From a request to a trajectory, a bounded piece of work a tick.
+//!
+//! ```text
+//! Survey ---> Balance (x ROUNDS) ---> Verify ---> Trajectory
+//!   | reach,     | S-curve whose        | one time scale that
+//!   | limits,    | accelerations fill   | provably keeps every sample
+//!   | speeds     | the torque limits    | inside every limit
+//!   +------------+----------------------+---> Refusal (reason, axis, value, limit)
+//! ```
+//!
+//! Constant joint acceleration limits would waste half of the robot: what bounds a SCARA is motor
+//! torque, and inertia changes along the way. The planner therefore scales an S-curve to the
+//! torques of the model. Torque is affine in the path acceleration, so each round corrects the
+//! two accelerations (speeding up, braking) by the worst ratio of torque left to torque needed;
+//! the last pass uses that inverse dynamics is quadratic in the time scale and solves for the
+//! scale at which the worst sample touches its limit (Hollerbach, *Dynamic scaling of manipulator
+//! trajectories*, 1984).
+
+use nalgebra::Vector4;
+use protocol::messages::{Refusal, RefusalReason};
+
+use super::capacity::Capacity;
+use super::path::{Path, PathError, PathPoint, check_limits};
+use super::profile::{Bounds, SCurve};
+use super::{Lift, Trajectory};
+use crate::arm::ArmModel;
+use crate::kinematics::{self, Elbow, IkError, Pose};
+use crate::math::wrap;
+
+/// Samples of path or trajectory that one tick looks at: the bound on planning work per tick.
+pub const SAMPLES_PER_TICK: u8 = 2;
+/// Points of the survey of a line.
+const SURVEY_POINTS: u8 = 32;
+/// Corrections of the two accelerations.
+const ROUNDS: u8 = 5;
+/// Samples of each half of the profile in one round.
+const BALANCE_POINTS: u8 = 12;
+/// Samples of the last pass.
+const VERIFY_POINTS: u8 = 96;
+/// A correction of an acceleration by more than this factor waits for the next round.
+const STEP: f32 = 1.6;
+/// Moves whose every axis travels less than this (rad or m) end where they begin.
+const NO_TRAVEL: f32 = 1e-6;
+
+/// What to move to. Lengths in m in frame 0 (z up), angles in rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// Straight in joint space to these joint positions.
+    Joints(Vector4<f32>),
+    /// Straight line of the tool.
+    Line(Pose),
+    /// Gate move: up, across (straight in joint space), down.
+    Jump {
+        /// Tool pose at the end.
+        pose: Pose,
+        /// Height of the tool at the top.
+        top: f32,
+        /// Height that is strictly vertical at both ends; above it the corners are blended.
+        clearance: f32,
+    },
+}
+
+/// A move to plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Number by which the operator knows the move.
+    pub sequence: u8,
+    /// Where to.
+    pub target: Target,
+    /// Share of full speed, 0 < speed <= 1.
+    pub speed: f32,
+}
+
+/// Progress of the plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Idle,
+    Survey {
+        point: u8,
+        fastest: Vector4<f32>,
+    },
+    Balance {
+        round: u8,
+        point: u8,
+        gain: [f32; 2],
+    },
+    Verify {
+        point: u8,
+        rate: f32,
+    },
+}
+
+/// Incremental planner; holds one request at a time.
+#[derive(Clone, Copy, Debug)]
+pub struct Planner {
+    stage: Stage,
+    draft: Trajectory,
+    bounds: Bounds,
+    speed: f32,
+    /// Clearance and rises of a jump: up, down, clearance.
+    gate: Option<Gate>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Gate {
+    rise: f32,
+    fall: f32,
+    clearance: f32,
+}
+
+impl Planner {
+    /// An idle planner.
+    pub fn new() -> Self {
+        Self {
+            stage: Stage::Idle,
+            draft: Trajectory {
+                path: Path::Joint {
+                    start: Vector4::zeros(),
+                    delta: Vector4::zeros(),
+                },
+                profile: SCurve::default(),
+                start: 0.0,
+                lift: None,
+                span: 0.0,
+                rate: 1.0,
+                braking: Vector4::zeros(),
+                end: Vector4::zeros(),
+                sequence: 0,
+            },
+            bounds: Bounds {
+                speed: 1.0,
+                accelerate: 1.0,
+                brake: 1.0,
+                jerk: 1.0,
+            },
+            speed: 1.0,
+            gate: None,
+        }
+    }
+
+    /// Whether no request is being planned.
+    pub fn is_idle(&self) -> bool {
+        self.stage == Stage::Idle
+    }
+
+    /// Forgets the request at hand and returns its number.
+    pub fn cancel(&mut self) -> Option<u8> {
+        let planning = !self.is_idle();
+        self.stage = Stage::Idle;
+        planning.then_some(self.draft.sequence)
+    }
+
+    /// Number of the request at hand, or of the last one.
+    pub fn sequence(&self) -> u8 {
+        self.draft.sequence
+    }
+
+    /// Takes a request for a move from the joint positions `from`.
+    ///
+    /// # Errors
+    /// A target that is not finite, out of reach or outside a limit is refused at once.
+    pub fn begin(
+        &mut self,
+        arm: &ArmModel,
+        request: &Request,
+        from: &Vector4<f32>,
+    ) -> Result<(), Refusal> {
+        self.stage = Stage::Idle;
+        self.gate = None;
+        if !(request.speed > 0.0 && request.speed <= 1.0) {
+            return Err(Refusal::value(
+                RefusalReason::OutOfRange,
+                request.speed,
+                1.0,
+            ));
+        }
+        let path = match &request.target {
+            Target::Joints(q) => {
+                check_limits(arm, q).map_err(from_ik)?;
+                straight(from, q)
+            }
+            Target::Line(pose) => line(arm, from, pose)?,
+            Target::Jump {
+                pose,
+                top,
+                clearance,
+            } => {
+                let elbow = Elbow::of(from);
+                let q = kinematics::inverse(arm, pose, elbow, from).map_err(from_ik)?;
+                let gate = gate(arm, from, &q, *top, *clearance)?;
+                self.gate = Some(gate);
+                let mut across = q;
+                across.z = from.z;
+                straight(from, &across)
+            }
+        };
+        self.speed = request.speed;
+        self.draft = Trajectory {
+            path,
+            profile: SCurve::default(),
+            start: 0.0,
+            lift: None,
+            span: 0.0,
+            rate: 1.0,
+            braking: Vector4::zeros(),
+            end: *from,
+            sequence: request.sequence,
+        };
+        self.stage = Stage::Survey {
+            point: 0,
+            fastest: Vector4::zeros(),
+        };
+        Ok(())
+    }
+
+    /// One tick of planning: at most [`SAMPLES_PER_TICK`] samples of the move. Returns the
+    /// trajectory or the refusal when the plan is complete.
+    pub fn work(&mut self, capacity: &Capacity<'_>) -> Option<Result<Trajectory, Refusal>> {
+        for _ in 0..SAMPLES_PER_TICK {
+            let done = match self.stage {
+                Stage::Idle => return None,
+                Stage::Survey { point, fastest } => self.survey(capacity, point, fastest),
+                Stage::Balance { round, point, gain } => self.balance(capacity, round, point, gain),
+                Stage::Verify { point, rate } => self.verify(capacity, point, rate),
+            };
+            match done {
+                Ok(None) => {}
+                Ok(Some(trajectory)) => {
+                    self.stage = Stage::Idle;
+                    return Some(Ok(trajectory));
+                }
+                Err(refusal) => {
+                    self.stage = Stage::Idle;
+                    return Some(Err(refusal));
+                }
+            }
+        }
+        None
+    }
+
+    /// Reach, limits and the largest joint travel per unit of path.
+    fn survey(
+        &mut self,
+        capacity: &Capacity<'_>,
+        point: u8,
+        fastest: Vector4<f32>,
+    ) -> Result<Option<Trajectory>, Refusal> {
+        let s = f32::from(point) / f32::from(SURVEY_POINTS);
+        let here = self.point(capacity.arm, s)?;
+        check_limits(capacity.arm, &here.q).map_err(from_ik)?;
+        let fastest = fastest.sup(&here.dq.abs());
+        // A path straight in joint space lies between its ends, which are within the limits.
+        let last = matches!(self.draft.path, Path::Joint { .. }) || point >= SURVEY_POINTS;
+        if !last {
+            self.stage = Stage::Survey {
+                point: point + 1,
+                fastest,
+            };
+            return Ok(None);
+        }
+        let limits = &capacity.arm.limits;
+        let fill = |limit: &Vector4<f32>| {
+            limit
+                .iter()
+                .zip(fastest.iter())
+                .filter(|(_, travel)| **travel > NO_TRAVEL)
+                .map(|(limit, travel)| limit / travel)
+                .fold(f32::MAX, f32::min)
+        };
+        let speed = fill(&capacity.speed());
+        if speed == f32::MAX {
+            // Nothing travels along the path: at most the lift of a jump moves.
+            self.bounds.speed = 0.0;
+        } else {
+            let acceleration = fill(&limits.acceleration);
+            self.bounds = Bounds {
+                speed,
+                accelerate: acceleration,
+                brake: acceleration,
+                jerk: fill(&limits.jerk),
+            };
+        }
+        self.compose(capacity);
+        self.stage = if self.bounds.speed > 0.0 {
+            Stage::Balance {
+                round: 0,
+                point: 0,
+                gain: [STEP; 2],
+            }
+        } else {
+            Stage::Verify {
+                point: 0,
+                rate: 1.0,
+            }
+        };
+        Ok(None)
+    }
+
+    /// One sample of one half; at the end of a round, new accelerations.
+    fn balance(
+        &mut self,
+        capacity: &Capacity<'_>,
+        round: u8,
+        point: u8,
+        gain: [f32; 2],
+    ) -> Result<Option<Trajectory>, Refusal> {
+        let profile = &self.draft.profile;
+        let braking = point >= BALANCE_POINTS;
+        let share = (f32::from(point % BALANCE_POINTS) + 0.5) / f32::from(BALANCE_POINTS);
+        let (from, to) = if braking {
+            (profile.brake_start(), profile.duration())
+        } else {
+            (0.0, profile.accelerate_end())
+        };
+        let along = profile.at(from + share * (to - from));
+        let here = self.point(capacity.arm, along.s)?;
+        let [mut speeding_gain, mut braking_gain] = gain;
+        let room = capacity.acceleration_room(&here, &along);
+        if braking {
+            braking_gain = braking_gain.min(room);
+        } else {
+            speeding_gain = speeding_gain.min(room);
+        }
+        if point + 1 < 2 * BALANCE_POINTS {
+            self.stage = Stage::Balance {
+                round,
+                point: point + 1,
+                gain: [speeding_gain, braking_gain],
+            };
+            return Ok(None);
+        }
+        let (up, down) = profile.peaks();
+        let ceiling = self.acceleration_ceiling(capacity.arm);
+        let correct = |peak: f32, gain: f32| (peak * gain.max(1.0 / STEP)).min(ceiling);
+        self.bounds.accelerate = correct(up, speeding_gain);
+        self.bounds.brake = correct(down, braking_gain);
+        self.compose(capacity);
+        self.stage = if round + 1 < ROUNDS {
+            Stage::Balance {
+                round: round + 1,
+                point: 0,
+                gain: [STEP; 2],
+            }
+        } else {
+            Stage::Verify {
+                point: 0,
+                rate: 1.0,
+            }
+        };
+        Ok(None)
+    }
+
+    /// One sample of the whole move; at the end, the trajectory.
+    fn verify(
+        &mut self,
+        capacity: &Capacity<'_>,
+        point: u8,
+        rate: f32,
+    ) -> Result<Option<Trajectory>, Refusal> {
+        let t = self.draft.span * f32::from(point) / f32::from(VERIFY_POINTS);
+        let reference = self.draft.at(capacity.arm, t).map_err(from_path)?;
+        let rate = rate.min(capacity.time_scale(&reference)?);
+        self.draft.braking = self.draft.braking.sup(&reference.qdd.abs());
+        if point < VERIFY_POINTS {
+            self.stage = Stage::Verify {
+                point: point + 1,
+                rate,
+            };
+            return Ok(None);
+        }
+        let mut trajectory = self.draft;
+        // Past the end, so that rounding of the last sample cannot leave the arm short of it.
+        trajectory.end = self.draft.at(capacity.arm, t + 1.0).map_err(from_path)?.q;
+        trajectory.braking *= rate * rate;
+        trajectory.rate = rate * self.speed;
+        Ok(Some(trajectory))
+    }
+
+    fn point(&self, arm: &ArmModel, s: f32) -> Result<PathPoint, Refusal> {
+        self.draft.path.at(arm, s).map_err(from_path)
+    }
+
+    /// The joint accelerations' own limits, as a limit along the path.
+    fn acceleration_ceiling(&self, arm: &ArmModel) -> f32 {
+        match &self.draft.path {
+            Path::Joint { delta, .. } => arm
+                .limits
+                .acceleration
+                .iter()
+                .zip(delta.iter())
+                .filter(|(_, travel)| travel.abs() > NO_TRAVEL)
+                .map(|(limit, travel)| limit / travel.abs())
+                .fold(f32::MAX, f32::min),
+            // Varies along a line; the last pass sees to it.
+            Path::Line { .. } => f32::MAX,
+        }
+    }
+
+    /// Profiles from the bounds, and for a jump how they lie over each other in time.
+    fn compose(&mut self, capacity: &Capacity<'_>) {
+        self.draft.profile = if self.bounds.speed > 0.0 {
+            SCurve::new(1.0, &self.bounds)
+        } else {
+            SCurve::default()
+        };
+        let across = self.draft.profile.duration();
+        let Some(gate) = self.gate else {
+            self.draft.start = 0.0;
+            self.draft.span = across;
+            return;
+        };
+        let from = match self.draft.path {
+            Path::Joint { start, .. } => start.z,
+            Path::Line { .. } => 0.0,
+        };
+        let (up_bounds, down_bounds) = capacity.lift(gate.rise.max(gate.fall));
+        let up = stroke(gate.rise, &up_bounds);
+        let down = stroke(gate.fall, &down_bounds);
+        let start = up.time_at(gate.clearance.min(gate.rise));
+        let blended = down.time_at(gate.fall - gate.clearance.min(gate.fall));
+        let down_start = (start + across - blended).max(up.duration());
+        self.draft.start = start;
+        self.draft.span = down_start + down.duration();
+        self.draft.lift = Some(Lift {
+            from,
+            up,
+            down,
+            down_start,
+        });
+    }
+}
+
+impl Default for Planner {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A profile over a length that may be nothing.
+fn stroke(length: f32, bounds: &Bounds) -> SCurve {
+    if length > NO_TRAVEL {
+        SCurve::new(length, bounds)
+    } else {
+        SCurve::default()
+    }
+}
+
+fn straight(from: &Vector4<f32>, to: &Vector4<f32>) -> Path {
+    Path::Joint {
+        start: *from,
+        delta: to - from,
+    }
+}
+
+fn line(arm: &ArmModel, from: &Vector4<f32>, to: &Pose) -> Result<Path, Refusal> {
+    let elbow = Elbow::of(from);
+    kinematics::inverse(arm, to, elbow, from).map_err(from_ik)?;
+    let start = kinematics::forward(&arm.geometry, from);
+    Ok(Path::Line {
+        start,
+        delta: Vector4::new(
+            to.x - start.x,
+            to.y - start.y,
+            to.z - start.z,
+            wrap(to.yaw - start.yaw),
+        ),
+        elbow,
+        wrist_turns: from.w - (from.x + from.y - start.yaw),
+    })
+}
+
+/// Heights of a jump; the top must lie above both ends and inside the stroke.
+fn gate(
+    arm: &ArmModel,
+    from: &Vector4<f32>,
+    to: &Vector4<f32>,
+    top: f32,
+    clearance: f32,
+) -> Result<Gate, Refusal> {
+    if !(top.is_finite() && clearance.is_finite()) {
+        return Err(Refusal::because(RefusalReason::NotFinite));
+    }
+    let d3_top = arm.geometry.d1 - arm.geometry.d4 - top;
+    let mut highest = *to;
+    highest.z = d3_top;
+    check_limits(arm, &highest).map_err(from_ik)?;
+    let (rise, fall) = (from.z - d3_top, to.z - d3_top);
+    if rise < 0.0 || fall < 0.0 || clearance < 0.0 {
+        return Err(Refusal::value(
+            RefusalReason::OutOfRange,
+            rise.min(fall).min(clearance),
+            0.0,
+        ));
+    }
+    Ok(Gate {
+        rise,
+        fall,
+        clearance,
+    })
+}
+
+/// The refusal that tells an operator what inverse kinematics found.
+pub fn from_ik(error: IkError) -> Refusal {
+    match error {
+        IkError::NotFinite => Refusal::because(RefusalReason::NotFinite),
+        IkError::TooFar { radius, max } => Refusal::value(RefusalReason::TooFar, radius, max),
+        IkError::TooNear { radius, min } => Refusal::value(RefusalReason::TooNear, radius, min),
+        IkError::Limit { axis, value, limit } => Refusal {
+            reason: RefusalReason::JointLimit,
+            axis: axis as u8,
+            value,
+            limit,
+        },
+    }
+}
+
+fn from_path(error: PathError) -> Refusal {
+    match error {
+        PathError::Unreachable(error) => from_ik(error),
+        PathError::Singular { sin_elbow } => Refusal::value(
+            RefusalReason::Singular,
+            sin_elbow.abs(),
+            super::path::MIN_SIN_ELBOW,
+        ),
+    }
+}

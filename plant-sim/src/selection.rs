@@ -1,0 +1,106 @@
+//! Names of control laws as people write them: `LAW` or `LAW:COMPENSATION`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use protocol::messages::{Compensation, Law};
+use serde::Deserialize;
+
+/// A control law and what helps it against friction and payload error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub struct LawChoice {
+    /// Law.
+    pub law: Law,
+    /// Compensation; `None` for laws that have none.
+    pub compensation: Compensation,
+}
+
+/// A name that is no control law.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LawError {
+    /// No such law.
+    #[error("no control law '{0}'; there are {list}", list = names())]
+    Law(String),
+    /// No such compensation.
+    #[error("no compensation '{0}'; there are none, integral, observer")]
+    Compensation(String),
+    /// Only the computed-torque laws take one.
+    #[error("{0} takes no compensation; only computed-torque and computed-torque-task do")]
+    NotTaken(Law),
+}
+
+fn names() -> String {
+    Law::CODES
+        .iter()
+        .map(|(_, name)| *name)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+fn takes_compensation(law: Law) -> bool {
+    matches!(law, Law::ComputedTorqueJoint | Law::ComputedTorqueTask)
+}
+
+impl FromStr for LawChoice {
+    type Err = LawError;
+
+    fn from_str(text: &str) -> Result<Self, LawError> {
+        let (name, suffix) = match text.split_once(':') {
+            Some((name, suffix)) => (name, Some(suffix)),
+            None => (text, None),
+        };
+        let law = Law::from_name(name).ok_or_else(|| LawError::Law(name.into()))?;
+        let compensation = match suffix {
+            None if takes_compensation(law) => Compensation::Observer,
+            None => Compensation::None,
+            Some(_) if !takes_compensation(law) => return Err(LawError::NotTaken(law)),
+            Some(suffix) => Compensation::from_name(suffix)
+                .ok_or_else(|| LawError::Compensation(suffix.into()))?,
+        };
+        Ok(Self { law, compensation })
+    }
+}
+
+impl TryFrom<String> for LawChoice {
+    type Error = LawError;
+
+    fn try_from(text: String) -> Result<Self, LawError> {
+        text.parse()
+    }
+}
+
+impl fmt::Display for LawChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if takes_compensation(self.law) {
+            write!(f, "{}:{}", self.law, self.compensation)
+        } else {
+            write!(f, "{}", self.law)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_reads_back_as_written() {
+        for law in Law::ALL {
+            for compensation in Compensation::ALL {
+                let taken = takes_compensation(*law);
+                let choice = LawChoice {
+                    law: *law,
+                    compensation: if taken {
+                        *compensation
+                    } else {
+                        Compensation::None
+                    },
+                };
+                assert_eq!(choice.to_string().parse(), Ok(choice));
+            }
+        }
+        assert!("pid:observer".parse::<LawChoice>().is_err());
+        assert!("computed-torque:x".parse::<LawChoice>().is_err());
+    }
+}
