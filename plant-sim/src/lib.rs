@@ -5,6 +5,7 @@
 pub mod bus;
 mod convert;
 pub mod drives;
+pub mod endpoint;
 pub mod metrics;
 pub mod model;
 pub mod operator;

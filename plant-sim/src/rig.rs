@@ -10,13 +10,13 @@ use std::collections::VecDeque;
 use firmware::arm::ArmModel;
 use firmware::controller::Config;
 use firmware::node::Node;
-use protocol::bus::{Bus, TransmitError};
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{Emergency, Message, Mode};
 
 use crate::bus::{BitTiming, BuiltinBus, Delivery, FrameBits, NodeId, Statistics};
 use crate::drives::Drives;
+use crate::endpoint::{Endpoint, EndpointError};
 use crate::model::RobotModel;
 use crate::operator::{Hand, Operator, OperatorError};
 use crate::plant::Plant;
@@ -79,6 +79,9 @@ pub enum RunError {
     /// The controller stopped answering.
     #[error("the controller is late: no command for {0} samples")]
     Silent(u64),
+    /// The controller's process or board failed.
+    #[error(transparent)]
+    Endpoint(#[from] EndpointError),
 }
 
 /// What a rig is made of.
@@ -96,34 +99,17 @@ pub struct RigConfig {
     pub timing: BitTiming,
 }
 
-/// A bus end with a receive queue in front of the node.
-#[derive(Debug, Default)]
-struct Mailbox {
-    received: VecDeque<CanFrame>,
-    to_send: Vec<CanFrame>,
-}
-
-impl Bus for Mailbox {
-    fn receive(&mut self) -> Option<CanFrame> {
-        self.received.pop_front()
-    }
-
-    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
-        self.to_send.push(*frame);
-        Ok(())
-    }
-}
-
 /// Plant, drives, bus and controller of one run.
-pub struct Rig {
+pub struct Rig<E> {
     plant: Plant,
     drives: Drives,
     bus: BuiltinBus,
     drives_at: NodeId,
     controller_at: NodeId,
     operator_at: NodeId,
-    controller: Node,
-    mailbox: Mailbox,
+    controller: E,
+    /// What the controller has just sent.
+    sent: Vec<CanFrame>,
     /// Frames that the controller has computed and that enter the bus at this time.
     computed: VecDeque<(u64, CanFrame)>,
     period: u64,
@@ -131,14 +117,12 @@ pub struct Rig {
     dropped: u64,
 }
 
-impl Rig {
+impl<E: Endpoint> Rig<E> {
     /// A rig at rest at time 0.
-    pub fn new(config: &RigConfig) -> Self {
+    pub fn new(config: &RigConfig, controller: E) -> Self {
         let period = (1e9 / config.rate_hz).round() as u64;
         let seconds = period as f64 * 1e-9;
         let mut bus = BuiltinBus::new(config.timing);
-        let mut controller = Config::new(config.believed, seconds as f32);
-        controller.command_delay = command_delay(&config.timing);
         Self {
             plant: Plant::new(&config.plant, config.start),
             drives: Drives::new(&config.plant, seconds),
@@ -146,8 +130,8 @@ impl Rig {
             controller_at: bus.attach(MAILBOXES),
             operator_at: bus.attach(MAILBOXES),
             bus,
-            controller: Node::new(controller),
-            mailbox: Mailbox::default(),
+            controller,
+            sent: Vec::new(),
             computed: VecDeque::new(),
             period,
             sample: 0,
@@ -170,9 +154,9 @@ impl Rig {
         &self.drives
     }
 
-    /// The controller.
-    pub fn controller(&self) -> &Node {
-        &self.controller
+    /// The controller, or its twin.
+    pub fn node(&self) -> &Node {
+        self.controller.node()
     }
 
     /// Frames that found a full transmit queue.
@@ -226,17 +210,17 @@ impl Rig {
             }
             observer.hand(&hand);
         }
-        self.poll_controller(now);
+        self.poll_controller(now, None)?;
         while let Some(event) = self.next_event(next) {
             match event {
                 Event::Computed(time, frame) => self.enqueue(self.controller_at, time, &frame),
                 Event::Delivered(delivery) => self.deliver(&delivery, operator, observer)?,
             }
         }
-        let reference = self.controller.controller().reference();
-        truth.rq = array(&reference.q);
-        truth.rqd = array(&reference.qd);
-        truth.mode = self.controller.controller().mode();
+        let controller = self.controller.node().controller();
+        truth.rq = array(&controller.reference().q);
+        truth.rqd = array(&controller.reference().qd);
+        truth.mode = controller.mode();
         observer.sample(&truth)?;
         self.sample += 1;
         Ok(())
@@ -300,24 +284,38 @@ impl Rig {
             operator.receive(&delivery.frame);
         }
         if !delivery.from.contains(self.controller_at) {
-            self.mailbox.received.push_back(delivery.frame);
-            self.poll_controller(delivery.time);
+            self.poll_controller(delivery.time, Some(&delivery.frame))?;
         }
         Ok(())
     }
 
-    /// The controller looks at its queue; what it sends is ready after its computing time.
-    fn poll_controller(&mut self, now: u64) {
-        self.controller.poll(now / 1000, &mut self.mailbox);
-        for frame in self.mailbox.to_send.drain(..) {
+    /// The controller looks at what has come; what it sends is ready after its computing time.
+    fn poll_controller(
+        &mut self,
+        now: u64,
+        received: Option<&CanFrame>,
+    ) -> Result<(), EndpointError> {
+        self.controller.poll(now / 1000, received, &mut self.sent)?;
+        for frame in self.sent.drain(..) {
             self.computed.push_back((now + COMPUTE_NS, frame));
         }
+        Ok(())
     }
 }
 
 enum Event {
     Computed(u64, CanFrame),
     Delivered(Delivery),
+}
+
+impl RigConfig {
+    /// What the controller of this rig is told.
+    pub fn controller(&self) -> Config {
+        let period = (1e9 / self.rate_hz).round() * 1e-9;
+        let mut config = Config::new(self.believed, period as f32);
+        config.command_delay = command_delay(&self.timing);
+        config
+    }
 }
 
 /// Samples without a command after which the controller counts as gone.

@@ -11,6 +11,7 @@ use protocol::messages::Emergency;
 use serde::Serialize;
 
 use crate::bus::BitTiming;
+use crate::endpoint::{Endpoint, InProcess};
 use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
 use crate::model::RobotModel;
 use crate::operator::{Hand, Operator};
@@ -313,7 +314,7 @@ pub fn execute(config: &RunConfig, out: Option<&Path>) -> Result<Summary, Execut
 
     let began = Instant::now();
     let mut operator = Operator::new(scenario);
-    let mut rig = Rig::new(&rig);
+    let mut rig = Rig::new(&rig, InProcess::new(rig.controller()));
     let result = rig.run(&mut operator, &mut recorder);
     let wall = began.elapsed().as_secs_f64();
 
@@ -387,7 +388,7 @@ fn cycle_target(scenario: &Scenario, robot: &RobotModel) -> [f64; 3] {
 
 fn summarise(
     config: &RunConfig,
-    rig: &Rig,
+    rig: &Rig<impl Endpoint>,
     metrics: &Metrics,
     faults: Vec<Fault>,
     result: &Result<(), RunError>,

@@ -84,8 +84,9 @@ struct Balance {
 
 /// The step (ns) that lands a loaded axis on its friction law within a few steps.
 ///
-/// The integrator is stable at any stiffness, but where friction changes over less than a thirtieth of what one step
-/// can do, an axis at rest under load only finds its place after hundreds of steps. Below 10 us that is accepted.
+/// The integrator is stable at any stiffness, but where friction builds up over less than a thirtieth of the speed that
+/// it can take away in one step, a loaded axis wobbles about its rest by a part of that speed. Friction so steep that
+/// steps of 10 us do not suffice is left to wobble by some 0.01 mm/s.
 fn resolvable_step(mass: &Matrix4<f64>, drive: &Drive) -> u64 {
     let response = integrator::factor(mass).inverse().diagonal();
     let steepest = response

@@ -1,33 +1,20 @@
-//! The command line.
+//! `plant-sim run`: a scenario from start to summary.
 
-use std::path::PathBuf;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, ValueEnum};
 use plant_sim::model::RobotModel;
 use plant_sim::run::{self, RunConfig, Summary};
 use plant_sim::scenario::{self, Scenario};
 use plant_sim::selection::LawChoice;
 
-/// Development bench for a SCARA drive cabinet: the controller that goes into the cabinet against
-/// a simulated IRB 930, over CAN.
-#[derive(Parser)]
-#[command(name = "plant-sim", version, args_conflicts_with_subcommands = true)]
-struct Cli {
-    #[command(subcommand)]
-    command: Option<Command>,
-    #[command(flatten)]
-    run: RunArgs,
-}
+use super::show;
 
-#[derive(Subcommand)]
-enum Command {
-    /// Run a scenario (the default command).
-    Run(RunArgs),
-}
-
+/// Arguments of `run`.
 #[derive(Args, Clone)]
-struct RunArgs {
+pub struct RunArgs {
     /// What to run: gate, gate-mismatch, square, pick-place, or a scenario file.
     #[arg(long, value_name = "NAME|FILE", default_value = "gate")]
     scenario: String,
@@ -70,15 +57,8 @@ enum BusChoice {
     Builtin,
 }
 
-pub fn main() -> Result<ExitCode, String> {
-    let cli = Cli::parse();
-    match cli.command {
-        None => run(&cli.run),
-        Some(Command::Run(args)) => run(&args),
-    }
-}
-
-fn run(args: &RunArgs) -> Result<ExitCode, String> {
+/// Runs the scenario, writes the results and shows the summary.
+pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let BusChoice::Builtin = args.bus;
     let mut scenario = Scenario::open(&args.scenario).map_err(|error| error.to_string())?;
     if let Some(law) = args.law {
@@ -115,9 +95,9 @@ fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let summary = run::execute(&config, Some(&args.out)).map_err(|error| error.to_string())?;
     if args.json {
         let json = serde_json::to_string_pretty(&summary).map_err(|error| error.to_string())?;
-        println!("{json}");
+        show(&(json + "\n"))?;
     } else {
-        print(&summary, &args.out);
+        show(&report(&summary, &args.out))?;
     }
     match &summary.error {
         None => Ok(ExitCode::SUCCESS),
@@ -125,7 +105,8 @@ fn run(args: &RunArgs) -> Result<ExitCode, String> {
     }
 }
 
-fn load(path: Option<&PathBuf>) -> Result<RobotModel, String> {
+/// The robot of a model file, or the built-in one; warnings go to standard error.
+pub fn load(path: Option<&PathBuf>) -> Result<RobotModel, String> {
     let Some(path) = path else {
         return Ok(RobotModel::irb_930_22_105());
     };
@@ -136,13 +117,23 @@ fn load(path: Option<&PathBuf>) -> Result<RobotModel, String> {
     Ok(model)
 }
 
-fn print(summary: &Summary, out: &std::path::Path) {
+/// A line of text; writing to a string cannot fail.
+macro_rules! line {
+    ($text:ident, $($arg:tt)*) => {{
+        let _ = writeln!($text, $($arg)*);
+    }};
+}
+
+/// The summary as a person reads it.
+fn report(summary: &Summary, out: &Path) -> String {
+    let mut text = String::new();
     let percent = |shares: &[f64; 4]| {
         shares
             .map(|share| format!("{:3.0} %", share * 100.0))
             .join("  ")
     };
-    println!(
+    line!(
+        text,
         "{} on {}, {} kg, {} at {} Hz, {} cycles",
         summary.scenario,
         summary.robot,
@@ -152,45 +143,56 @@ fn print(summary: &Summary, out: &std::path::Path) {
         summary.cycles
     );
     match &summary.cycle_time_s {
-        Some(time) => println!(
+        Some(time) => line!(
+            text,
             "  cycle time        {:.4} s mean ({:.4} to {:.4}), back within 1 mm",
-            time.mean, time.min, time.max
+            time.mean,
+            time.min,
+            time.max
         ),
-        None => println!("  cycle time        never back within 1 mm"),
+        None => line!(text, "  cycle time        never back within 1 mm"),
     }
     match &summary.settle_time_s {
-        Some(time) => println!(
+        Some(time) => line!(
+            text,
             "  settling          {:.1} ms mean, {:.1} ms max, to 0.01 mm after the commanded end",
             time.mean * 1e3,
             time.max * 1e3
         ),
-        None => println!("  settling          not within 0.01 mm"),
+        None => line!(text, "  settling          not within 0.01 mm"),
     }
-    println!(
+    line!(
+        text,
         "  tracking error    {:.4} mm rms, {:.4} mm max",
-        summary.tracking_error_mm.rms, summary.tracking_error_mm.max
+        summary.tracking_error_mm.rms,
+        summary.tracking_error_mm.max
     );
     if let Some(error) = summary.final_error_mm.max {
-        println!("  final error       {error:.4} mm max");
+        line!(text, "  final error       {error:.4} mm max");
     }
-    println!("                    shoulder  elbow  lift  wrist");
-    println!(
+    line!(text, "                    shoulder  elbow  lift  wrist");
+    line!(
+        text,
         "  torque, peak      {}",
         percent(&summary.torque_utilisation)
     );
-    println!(
+    line!(
+        text,
         "  torque, thermal   {}",
         percent(&summary.thermal_utilisation)
     );
-    println!(
+    line!(
+        text,
         "  speed, peak       {}",
         percent(&summary.speed_utilisation)
     );
-    println!(
+    line!(
+        text,
         "  saturation        {:.1} ms at most",
         summary.longest_saturation_s * 1e3
     );
-    println!(
+    line!(
+        text,
         "  bus               {:.1} % load, {} frames, {} lost, {} overruns",
         summary.bus_load * 100.0,
         summary.frames,
@@ -198,19 +200,31 @@ fn print(summary: &Summary, out: &std::path::Path) {
         summary.overruns
     );
     match summary.faults.as_slice() {
-        [] => println!("  faults            none"),
+        [] => line!(text, "  faults            none"),
         faults => {
             for fault in faults {
-                println!(
+                line!(
+                    text,
                     "  fault             {:.3} s: {} ({}): {}",
-                    fault.time_s, fault.cause, fault.code, fault.description
+                    fault.time_s,
+                    fault.cause,
+                    fault.code,
+                    fault.description
                 );
             }
         }
     }
-    println!(
+    line!(
+        text,
         "  simulated         {:.2} s in {:.3} s: {:.0} times real time",
-        summary.sim_time_s, summary.wall_time_s, summary.real_time_factor
+        summary.sim_time_s,
+        summary.wall_time_s,
+        summary.real_time_factor
     );
-    println!("  trace.log, truth.csv, summary.json in {}", out.display());
+    line!(
+        text,
+        "  trace.log, truth.csv, summary.json in {}",
+        out.display()
+    );
+    text
 }

@@ -1,0 +1,44 @@
+//! The command line: one file a subcommand.
+
+mod run;
+
+use std::io::{self, Write as _};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Development bench for a SCARA drive cabinet: the controller that goes into the cabinet against
+/// a simulated IRB 930, over CAN.
+#[derive(Parser)]
+#[command(name = "plant-sim", version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: run::RunArgs,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run a scenario (the default command).
+    Run(run::RunArgs),
+}
+
+/// Does what the command line says. An error is one message for the person who typed it.
+pub fn main() -> Result<ExitCode, String> {
+    let cli = Cli::parse();
+    match cli.command {
+        None => run::run(&cli.run),
+        Some(Command::Run(args)) => run::run(&args),
+    }
+}
+
+/// Writes to standard output. A reader that has seen enough and gone (`| head`) is no error.
+fn show(text: &str) -> Result<(), String> {
+    match io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(format!("cannot write to standard output: {error}"))
+        }
+        _ => Ok(()),
+    }
+}

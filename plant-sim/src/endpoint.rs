@@ -1,0 +1,88 @@
+//! Where the controller lives: the rig hands it frames and takes what it sends.
+
+use std::collections::VecDeque;
+
+use firmware::controller::Config;
+use firmware::node::Node;
+use protocol::bus::{Bus, TransmitError};
+use protocol::frame::CanFrame;
+
+/// A controller somewhere, in lock-step with the rig.
+pub trait Endpoint {
+    /// Lets the controller look at `received` at time `now` (µs) and appends what it sends.
+    ///
+    /// # Errors
+    /// The controller did not answer within the endpoint's limit, or answered what no controller
+    /// of this source would.
+    fn poll(
+        &mut self,
+        now: u64,
+        received: Option<&CanFrame>,
+        sent: &mut Vec<CanFrame>,
+    ) -> Result<(), EndpointError>;
+
+    /// The controller itself, or the twin that is fed the same frames: what it had in mind.
+    fn node(&self) -> &Node;
+}
+
+/// Why a controller is of no use any more.
+#[derive(Debug, thiserror::Error)]
+#[error("the controller {who} {what}")]
+pub struct EndpointError {
+    /// Which controller.
+    pub who: String,
+    /// What it did.
+    pub what: String,
+}
+
+/// The controller as a part of this process.
+#[derive(Debug)]
+pub struct InProcess {
+    node: Node,
+}
+
+impl InProcess {
+    /// A controller in self-test.
+    pub fn new(config: Config) -> Self {
+        Self {
+            node: Node::new(config),
+        }
+    }
+}
+
+impl Endpoint for InProcess {
+    fn poll(
+        &mut self,
+        now: u64,
+        received: Option<&CanFrame>,
+        sent: &mut Vec<CanFrame>,
+    ) -> Result<(), EndpointError> {
+        let mut port = Port {
+            received: received.copied().into_iter().collect(),
+            sent,
+        };
+        self.node.poll(now, &mut port);
+        Ok(())
+    }
+
+    fn node(&self) -> &Node {
+        &self.node
+    }
+}
+
+/// The node's end of the rig: never full, since the rig takes everything at once.
+struct Port<'a> {
+    received: VecDeque<CanFrame>,
+    sent: &'a mut Vec<CanFrame>,
+}
+
+impl Bus for Port<'_> {
+    fn receive(&mut self) -> Option<CanFrame> {
+        self.received.pop_front()
+    }
+
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        self.sent.push(*frame);
+        Ok(())
+    }
+}
