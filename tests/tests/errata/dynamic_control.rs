@@ -3,12 +3,14 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Matrix4, SVector, Vector4};
+use protocol::messages::Law;
 use tests::{Row, Table};
 
 use crate::arm::{Arm, State, bound_over, largest, verdict, worst};
+use crate::laws::{Controller, sensing_bound};
 use crate::ode::{integrate, split, stack};
-use crate::paper::control as paper;
-use crate::paper::kinematics::eq_27;
+use crate::paper::control::{self as paper, Motion};
+use crate::paper::kinematics::{eq_8_to_19, eq_27};
 use crate::paper::newton_euler::inverse_dynamics;
 use crate::product::{self, Dynamics};
 
@@ -28,76 +30,81 @@ fn equations_of_motion(
     )
 }
 
+/// Moves the arm under `law` from rest at `start` and gives time and position after every millisecond.
+fn run(
+    arm: &Arm,
+    start: &Vector4<f64>,
+    end: f64,
+    law: &dyn Fn(f64, Motion) -> Vector4<f64>,
+) -> Vec<(f64, Motion)> {
+    let f = |t: f64, x: &SVector<f64, 8>| {
+        let (q, qd) = split(x);
+        let (m, n) = equations_of_motion(arm, &q, &qd);
+        let effort = law(t, (q, qd)) - n;
+        stack(&qd, &m.cholesky().expect("a mass matrix").solve(&effort))
+    };
+    let mut path = Vec::new();
+    let steps = (end / STEP).round() as u32;
+    integrate(stack(start, &Vector4::zeros()), end, steps, f, |t, x| {
+        path.push((t, split(x)));
+    });
+    path
+}
+
+/// Step of the integration, s.
+const STEP: f64 = 1e-3;
+
+/// Bandwidth of all laws, rad/s, critically damped.
+const BANDWIDTH: f64 = 30.0;
+const KP: f64 = BANDWIDTH * BANDWIDTH;
+const KD: f64 = 2.0 * BANDWIDTH;
+
 #[test]
 fn erratum_40_tracking_takes_the_whole_model() {
     let arm = Arm::with_payload("p10");
-    let model = Dynamics::new("p10");
-    let (bandwidth, omega, swing, end, steps): (f64, f64, f64, f64, u32) =
-        (30.0, TAU, 0.5, 1.0, 1000);
+    let (omega, swing) = (TAU, 0.5);
     let rest = Vector4::new(0.2, 0.8, 0.1, 0.0);
     let along = Vector4::new(swing, swing, 0.0, 0.0);
     let reference = |t: f64| {
         let (s, c) = (omega * t).sin_cos();
-        (
-            rest + along * (1.0 - c),
-            along * (omega * s),
-            along * (omega * omega * c),
-        )
+        State {
+            q: rest + along * (1.0 - c),
+            qd: along * (omega * s),
+            qdd: along * (omega * omega * c),
+        }
     };
     let (m0, g) = equations_of_motion(&arm, &rest, &Vector4::zeros());
     // The same stiffness for both: inertia at the start times bandwidth squared, critically damped.
     let inertia = Matrix4::from_diagonal(&m0.diagonal());
-    let kp = bandwidth * bandwidth;
-    let kd = 2.0 * bandwidth;
-
-    let follow = |law: &dyn Fn(f64, &State) -> Vector4<f64>| {
-        let f = |t: f64, x: &SVector<f64, 8>| {
-            let (q, qd) = split(x);
-            let qdd = Vector4::zeros();
-            let tau = law(t, &State { q, qd, qdd });
-            let (m, n) = equations_of_motion(&arm, &q, &qd);
-            stack(&qd, &m.cholesky().expect("a mass matrix").solve(&(tau - n)))
-        };
-        let mut errors = Vec::new();
-        integrate(stack(&rest, &Vector4::zeros()), end, steps, f, |t, x| {
-            errors.push(largest(&(reference(t).0 - split(x).0)));
-        });
-        largest(&errors)
-    };
-    let printed = follow(&|t, s| {
-        let (q_d, qd_d, _) = reference(t);
-        paper::pd_gravity(
-            &(inertia * kp),
-            &(inertia * kd),
-            (q_d, qd_d),
-            (s.q, s.qd),
-            &g,
-        )
+    let printed = run(&arm, &rest, 1.0, &|t, actual| {
+        let State { q, qd, .. } = reference(t);
+        paper::pd_gravity(&(inertia * KP), &(inertia * KD), (q, qd), actual, &g)
     });
-    let corrected = follow(&|t, s| {
-        let (q_d, qd_d, qdd_d) = reference(t);
-        let qdd = qdd_d + (qd_d - s.qd) * kd + (q_d - s.q) * kp;
-        model.inverse(&State { qdd, ..*s })
+    let controller = Controller::new(Law::ComputedTorqueJoint, BANDWIDTH, "p10");
+    let corrected = run(&arm, &rest, 1.0, &|t, actual| {
+        controller.efforts(&reference(t), actual)
     });
+    let off =
+        |path: &[(f64, Motion)]| bound_over(path, |(t, (q, _))| largest(&(reference(*t).q - q)));
 
     // Theory: PD holds M qdd_d with its stiffness, so it lags by about qdd_d / bandwidth^2. Computed torque leaves a
     // critically damped error equation, driven by the rounding of the torque: at most M^-1 delta / bandwidth^2; the Runge-Kutta
     // method adds some (omega h)^4 of the swing.
-    let lag = swing * omega * omega / kp;
+    let lag = swing * omega * omega / KP;
     let rounding = bound_over(0..100, |hundredths| {
-        let (q, qd, qdd) = reference(f64::from(hundredths) * end / 100.0);
-        let (m, _) = equations_of_motion(&arm, &q, &qd);
+        let state = reference(f64::from(hundredths) / 100.0);
+        let (m, _) = equations_of_motion(&arm, &state.q, &state.qd);
         let inverse = m.try_inverse().expect("a mass matrix");
-        inverse.norm() * product::torque_bound(&arm, &State { q, qd, qdd })
+        inverse.norm() * product::torque_bound(&arm, &state)
     });
-    let method = (omega * end / f64::from(steps)).powi(4) * swing;
+    let method = (omega * STEP).powi(4) * swing;
     verdict(
         40,
         "tracking error on a 1 Hz swing of 1 rad, 10 kg",
         "rad",
-        (printed, corrected),
+        (off(&printed), off(&corrected)),
         0.5 * lag,
-        rounding / kp + method,
+        rounding / KP + sensing_bound(swing * omega, BANDWIDTH) + method,
     );
 }
 
@@ -140,6 +147,89 @@ fn erratum_41_rate_product_is_that_of_the_actual_motion() {
         2.0,
         product::ANGLE_BOUND * scale,
     );
+}
+
+/// x, y, z and yaw of the flange; yaw without wrapping.
+fn pose(arm: &Arm, q: &Vector4<f64>) -> Vector4<f64> {
+    let (_, o) = eq_8_to_19(arm, q);
+    Vector4::new(o.x, o.y, o.z, q.x + q.y - q.w)
+}
+
+/// Rows vx vy vz wz of eq. 27.
+fn task_jacobian(arm: &Arm, q: &Vector4<f64>) -> Matrix4<f64> {
+    let j = eq_27(arm, q);
+    Matrix4::from_rows(&[0, 1, 2, 5].map(|row| j.row(row).into_owned()))
+}
+
+#[test]
+fn erratum_41_and_51_the_task_law_has_linear_error_dynamics() {
+    let arm = Arm::with_payload("p10");
+    let controller = Controller::new(Law::ComputedTorqueTask, BANDWIDTH, "p10");
+    let end = 0.5;
+    // Two set points: one at a yaw of 0.9 rad, and one to which the short way leads past half a turn, from 3.04 to 3.24 rad.
+    for wrist in [0.8, -1.54] {
+        let target = State {
+            q: Vector4::new(0.1, 1.6, 0.15, wrist),
+            qd: Vector4::zeros(),
+            qdd: Vector4::zeros(),
+        };
+        let start = Vector4::new(0.6, 1.0, 0.05, wrist + 0.1);
+        let goal = pose(&arm, &target.q);
+        let offset = goal - pose(&arm, &start);
+        let zero = Vector4::zeros();
+
+        let printed = run(&arm, &start, end, &|_, (q, qd)| {
+            let (m, n) = equations_of_motion(&arm, &q, &qd);
+            let j = task_jacobian(&arm, &q);
+            let here = (pose(&arm, &q), j * qd);
+            let bracket = paper::eq_49_bracket(&zero, &zero, (KP, KD), (goal, zero), here);
+            m * j.try_inverse().expect("off the singularity") * bracket + n
+        });
+        let corrected = run(&arm, &start, end, &|_, actual| {
+            controller.efforts(&target, actual)
+        });
+        // Theory: e'' + 2 b e' + b^2 e = 0 from rest.
+        let off = |path: &[(f64, Motion)]| {
+            bound_over(path, |(t, (q, _))| {
+                let decay = (1.0 + BANDWIDTH * t) * (-BANDWIDTH * t).exp();
+                largest(&(goal - pose(&arm, q) - offset * decay))
+            })
+        };
+
+        // What Jdot qd leaves over is a centripetal acceleration of the speed at half-way, e0 b / e, on the reach.
+        let reach = arm.a1 + arm.a2;
+        let distance = offset.xy().norm();
+        let centripetal = (distance * BANDWIDTH / 1.0_f64.exp()).powi(2) / reach;
+        // Rounding: torque through M^-1 and J; the inverse of J on everything it is asked for; the state; the method,
+        // (b h)^4 / 120 of the way.
+        let rounding = bound_over(&corrected, |(t, (q, qd))| {
+            let (m, _) = equations_of_motion(&arm, q, qd);
+            let inverse = m.try_inverse().expect("a mass matrix");
+            let j = task_jacobian(&arm, q);
+            let pull = offset * (KP * (1.0 + BANDWIDTH * t) * (-BANDWIDTH * t).exp());
+            let back = j.try_inverse().expect("off the singularity");
+            let qdd = back.abs() * (pull.abs() + (j * qd).abs() * KD);
+            let state = State {
+                q: *q,
+                qd: *qd,
+                qdd,
+            };
+            let efforts = product::torque_bounds(&arm, &state);
+            let asked = pull.lp_norm(1) + (j * qd).lp_norm(1) * KD;
+            largest(&(j.abs() * inverse.abs() * efforts))
+                + product::inverse_jacobian_bound(&arm, q) * asked
+        });
+        let sensing = product::ANGLE_BOUND + sensing_bound(distance * BANDWIDTH, BANDWIDTH);
+        let method = (BANDWIDTH * STEP).powi(4) / 120.0 * offset.lp_norm(1);
+        verdict(
+            41,
+            "pose error against (1 + b t) e^(-b t) on the way to a set point",
+            "m, rad",
+            (off(&printed), off(&corrected)),
+            0.1 * centripetal / KP,
+            rounding / KP + sensing + method,
+        );
+    }
 }
 
 /// Jdot qd of the task (vx, vy, vz, wz), from differences of eq. 27, which agrees with Pinocchio.

@@ -12,6 +12,7 @@ mod jacobian;
 mod kinematic_control;
 mod kinematics;
 mod lagrange;
+mod laws;
 mod newton_euler;
 mod ode;
 mod paper;

@@ -169,7 +169,7 @@ pub fn flange_velocity(q: &Vector4<f64>, qd: &Vector4<f64>) -> (Vector3<f64>, Ve
 }
 
 /// The payload of the `payload` column of the dynamics tables.
-fn payload(label: &str) -> Payload {
+pub fn payload(label: &str) -> Payload {
     match label {
         "none" => Payload::NONE,
         "p10" => Payload {
@@ -268,10 +268,15 @@ fn magnitudes(arm: &Arm, state: &State) -> Vector4<f64> {
     Vector4::new(f1 + f2 + f4, f2 + f4, lifted * (qdd.z + arm.g), f4)
 }
 
-/// Error of the closed-form torques, largest of the four: 32 u of the magnitudes by the controller's own account for exact
+/// Error of the closed-form torques: 32 u of the magnitudes by the controller's own account for exact
 /// inputs, 9.5 u for angles of up to 2.5 + 7.0 rad rounded, 3 u for rounded rates and accelerations.
+pub fn torque_bounds(arm: &Arm, state: &State) -> Vector4<f64> {
+    magnitudes(arm, state) * (48.0 * U32)
+}
+
+/// The largest of the four.
 pub fn torque_bound(arm: &Arm, state: &State) -> f64 {
-    48.0 * U32 * largest(&magnitudes(arm, state))
+    largest(&torque_bounds(arm, state))
 }
 
 /// The same, largest over the rows with one payload.

@@ -1,0 +1,84 @@
+//! The controller's laws as the paper writes them: in continuous time, without friction and rotors.
+
+use firmware::arm::{ArmModel, DriveTrain, IRB_930};
+use firmware::body::Body;
+use firmware::kinematics::Trig;
+use firmware::laws::{Gains, Memory, Selection, Situation};
+use firmware::trajectory::Reference;
+use nalgebra::Vector4;
+use protocol::messages::{Compensation, Law};
+
+use crate::arm::{State, U32};
+use crate::product::payload;
+
+/// Links alone, to which the laws of the paper belong.
+const DRIVE: DriveTrain = DriveTrain {
+    rotor_inertia: Vector4::new(0.0, 0.0, 0.0, 0.0),
+    viscous: Vector4::new(0.0, 0.0, 0.0, 0.0),
+    coulomb: Vector4::new(0.0, 0.0, 0.0, 0.0),
+    ..IRB_930.drive
+};
+
+const ARM: ArmModel = ArmModel {
+    drive: DRIVE,
+    ..IRB_930
+};
+
+/// A law with the arm and payload it knows and its gains, critically damped.
+pub struct Controller {
+    selection: Selection,
+    body: Body,
+}
+
+impl Controller {
+    /// A law at a bandwidth (rad/s), with the payload of a table.
+    pub fn new(law: Law, bandwidth: f64, label: &str) -> Self {
+        let gains = Gains {
+            bandwidth: bandwidth as f32,
+            damping: 1.0,
+            observer: 1.0,
+        };
+        let selection = Selection {
+            law,
+            compensation: Compensation::None,
+            gains,
+        };
+        let body = Body::new(&ARM, &payload(label));
+        Self { selection, body }
+    }
+
+    /// Joint efforts in a state, with the reference as it is now: no delay to make up for.
+    pub fn efforts(
+        &self,
+        reference: &State,
+        (q, qd): (Vector4<f64>, Vector4<f64>),
+    ) -> Vector4<f64> {
+        let q = q.cast();
+        let reference = Reference {
+            q: reference.q.cast(),
+            qd: reference.qd.cast(),
+            qdd: reference.qdd.cast(),
+            qddd: Vector4::zeros(),
+        };
+        let situation = Situation {
+            arm: &ARM,
+            body: &self.body,
+            trig: &Trig::new(&q),
+            q,
+            qd: qd.cast(),
+            torque: Vector4::zeros(),
+            reference,
+            mean_qd: reference.qd,
+            ahead: reference,
+            period: 1e-3,
+            saturated: Vector4::zeros(),
+        };
+        self.selection.torque(&situation, &mut Memory::new()).cast()
+    }
+}
+
+/// What rounding position and velocity to f32 does to a critically damped error equation (rad, m): positions up to 7
+/// rad, and velocities `speed` over half the bandwidth, for state and reference each.
+pub fn sensing_bound(speed: f64, bandwidth: f64) -> f64 {
+    2.0 * U32 * (7.0 + 2.0 * speed / bandwidth)
+}
