@@ -91,6 +91,16 @@ fn wrapped_angle_keeps_its_error() {
 #[test]
 fn wrap_closes_the_range_above() {
     use std::f32::consts::PI;
+    // Next to half a turn the rounded quotient may be the neighbour of the right one.
+    for odd in (-2601..=2601).step_by(2) {
+        for angle in neighbourhood(f64::from(odd) * std::f64::consts::PI) {
+            let wrapped = wrap(angle);
+            assert!(
+                -PI < wrapped && wrapped <= PI,
+                "wrap({angle:e}) is {wrapped}"
+            );
+        }
+    }
     assert_eq!(wrap(PI), PI);
     assert_eq!(wrap(-PI), PI);
     assert_eq!(wrap((-PI).next_up()), (-PI).next_up());

@@ -6,7 +6,7 @@ use common::{U, arm, assert_close, position, speed, within};
 use firmware::arm::{ArmModel, IRB_930};
 use firmware::jacobian::{DAMPING_ONSET, Jacobian, SINGULAR_SINE};
 use firmware::kinematics::Trig;
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use proptest::prelude::*;
 
 /// Error of an element, as its documentation says.
@@ -175,17 +175,29 @@ proptest! {
         }
     }
 
-    /// Damping never turns the flange against the wanted direction: the horizontal part of the map v to J J^+ v has no
-    /// negative eigenvalue.
+    /// What makes it damped least squares: `|J w - v|^2 + damping |w|^2` is least, so that its gradient is zero and
+    /// `J^T (v - J w)` is the damping times w, a damping between zero and a quarter of the squared onset.
     #[test]
-    fn damped_motion_never_opposes_the_command(q in position(), near_stretch in -0.2..=0.2f32, v in task_velocity()) {
+    fn damped_speed_is_a_least_squares_solution(q in position(), near_stretch in -0.2..=0.2f32, v in task_velocity()) {
         let q = Vector4::new(q.x, near_stretch, q.z, q.w);
         let jacobian = jacobian(&IRB_930, &q);
-        let found = jacobian.task_velocity(&jacobian.joint_speed_damped(&v));
-        let along = f64::from(found.x) * f64::from(v.x) + f64::from(found.y) * f64::from(v.y);
-        let length = f64::from(v.x).powi(2) + f64::from(v.y).powi(2);
-        let gain = 1.155 / (f64::from(DAMPING_ONSET) * reach(&IRB_930));
-        prop_assert!(along >= -length * gain * 8.0 * element_error(&IRB_930));
+        let qd = jacobian.joint_speed_damped(&v);
+        let block: Matrix2<f64> = jacobian.task().map(f64::from).fixed_view::<2, 2>(0, 0).into();
+        let (w, v) = (wide(&qd).xy(), wide(&v).xy());
+        let gradient = block.transpose() * (v - block * w);
+
+        // The determinant and the elements it stands for are rounded apart, by 4 reach times an element's error. With n for
+        // the norm of the block, the denominator is at least n^2 e^2 / 4, so that w is off by at most 16 reach / (n e^2) of
+        // that times v, and the gradient by n^2 of it; all other roundings are of smaller terms.
+        let onset = f64::from(DAMPING_ONSET) * reach(&IRB_930);
+        let norm = block.iter().map(|element| element * element).sum::<f64>().sqrt();
+        let length = |x: Vector2<f64>| x.x.hypot(x.y);
+        let error = 17.0 * norm * reach(&IRB_930) * element_error(&IRB_930) / (onset * onset) * length(v);
+        let across = gradient.x * w.y - gradient.y * w.x;
+        prop_assert!(across.abs() <= error * length(w), "{across:e}, allowed {:e}", error * length(w));
+        let along = gradient.dot(&w);
+        let most = onset * onset / 4.0 * w.dot(&w);
+        prop_assert!(-error * length(w) <= along && along <= most + error * length(w));
     }
 }
 

@@ -30,6 +30,13 @@ fn distance(a: &Pose, b: &Pose) -> f64 {
         .hypot(f64::from(a.z - b.z))
 }
 
+fn is_within_limits(arm: &ArmModel, q: &Vector4<f32>) -> bool {
+    let limits = &arm.limits;
+    Axis::ALL
+        .into_iter()
+        .all(|axis| (axis.of(&limits.lower)..=axis.of(&limits.upper)).contains(&axis.of(q)))
+}
+
 /// Difference of two angles, whole turns apart or not.
 fn turn_between(a: f32, b: f32) -> f64 {
     let turn = f64::from(a) - f64::from(b);
@@ -121,7 +128,10 @@ proptest! {
         let arm = IRB_930;
         let pose = forward(&arm.geometry, &q);
         let hint = Vector4::new(0.0, 0.0, 0.0, near);
-        let Ok(found) = inverse(&arm, &pose, Elbow::of(&q), &hint) else { return Ok(()) };
+        // Next to the stretched arm the shoulder may miss its limit by more than the tolerance.
+        prop_assume!(q.y.abs() > 0.5);
+        let found = inverse(&arm, &pose, Elbow::of(&q), &hint);
+        let found = found.map_err(|error| TestCaseError::fail(error.to_string()))?;
         let (lower, upper) = (arm.limits.lower.w, arm.limits.upper.w);
         prop_assert!((lower..=upper).contains(&found.w));
         let gap = (f64::from(found.w) - f64::from(near)).abs();
@@ -149,6 +159,7 @@ proptest! {
         let found = inverse(&arm, &pose, Elbow::of(&q), &q);
         let found = found.map_err(|error| TestCaseError::fail(error.to_string()))?;
         prop_assert!((found.w - q.w).abs() < 1.0, "the wrist jumps a turn: {found} for {q}");
+        prop_assert!(is_within_limits(&arm, &found), "{found}");
     }
 
     /// No input, of any bits, does anything but give a position within the limits or say why not.
@@ -158,10 +169,7 @@ proptest! {
         let elbow = if negative { Elbow::Negative } else { Elbow::Positive };
         let hint = Vector4::new(0.0, 0.0, 0.0, near);
         if let Ok(q) = inverse(&IRB_930, &Pose { x, y, z, yaw }, elbow, &hint) {
-            for axis in Axis::ALL {
-                let (lower, upper) = (axis.of(&IRB_930.limits.lower), axis.of(&IRB_930.limits.upper));
-                prop_assert!((lower..=upper).contains(&axis.of(&q)));
-            }
+            prop_assert!(is_within_limits(&IRB_930, &q));
         }
     }
 }

@@ -10,7 +10,7 @@ mod magnitude;
 
 use std::f64::consts::{PI, TAU};
 
-use firmware::arm::{Axis, IRB_930, Payload};
+use firmware::arm::{ArmModel, Axis, DriveTrain, Geometry, IRB_930, JointLimits, Link, Payload};
 use firmware::dynamics::drive::Drive;
 use firmware::dynamics::lagrange::Lagrange;
 use firmware::dynamics::newton_euler;
@@ -21,7 +21,7 @@ use firmware::kinematics::{
 use firmware::velocity::propagate;
 use magnitude::{LAGRANGE, NEWTON_EULER};
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
-use tests::{Row, Table};
+use tests::{Row, Table, reference};
 
 /// Unit roundoff of f32.
 const U: f64 = 1.0 / (1u32 << 24) as f64;
@@ -92,6 +92,59 @@ fn turn_between(a: f64, b: f64) -> f64 {
 
 /// Roundings in a coordinate of the flange, in u of the reach: 9.1 of the worse sine, 2 sums and products, 1 model length.
 const POSITION: f64 = 13.0;
+
+/// Every number of the built-in arm, rounded once.
+#[test]
+fn built_in_arm_is_the_reference_arm() {
+    let text = std::fs::read_to_string(reference("model.json")).expect("readable");
+    let json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let number = |path: &str| {
+        let value = json.pointer(path).unwrap_or_else(|| panic!("no {path}"));
+        value
+            .as_f64()
+            .unwrap_or_else(|| panic!("{path} is no number")) as f32
+    };
+    let joint = |path: &str| Vector4::from_fn(|i, _| number(&format!("{path}/{i}")));
+    let vector = |path: &str| Vector3::from_fn(|i, _| number(&format!("{path}/{i}")));
+    let arm = ArmModel {
+        geometry: Geometry {
+            a1: number("/dh/a1"),
+            a2: number("/dh/a2"),
+            d1: number("/dh/d1") + number("/dh/d2"),
+            d4: number("/dh/d4"),
+        },
+        links: std::array::from_fn(|i| Link {
+            mass: number(&format!("/links/{i}/mass")),
+            com: vector(&format!("/links/{i}/com_joint_frame")),
+            inertia: vector(&format!("/links/{i}/inertia_com_diag")),
+        }),
+        gravity: -number("/gravity/2"),
+        limits: JointLimits {
+            lower: joint("/joint_limits/lower"),
+            upper: joint("/joint_limits/upper"),
+            velocity: joint("/joint_limits/velocity"),
+            acceleration: joint("/joint_limits/acceleration_cap"),
+            jerk: joint("/joint_limits/jerk_cap"),
+            effort: joint("/joint_limits/effort_peak"),
+            effort_continuous: joint("/joint_limits/effort_continuous_rms"),
+        },
+        drive: DriveTrain {
+            gear_ratio: joint("/drive/gear_ratio"),
+            screw_lead: number("/drive/ball_screw_lead_m_per_rev"),
+            screw_hand: number("/drive/screw_hand_sign"),
+            rotor_inertia: joint("/drive/rotor_inertia_motor_side"),
+            motor_torque_limit: joint("/drive/motor_torque_limit_model"),
+            motor_torque_rated: joint("/drive/motor_rated_torque"),
+            motor_speed_limit: joint("/drive/motor_max_speed_rad_s"),
+            viscous: joint("/drive/viscous"),
+            coulomb: joint("/drive/coulomb"),
+            coulomb_eps: joint("/drive/coulomb_tanh_eps"),
+            encoder_counts: number("/drive/encoder_counts_per_motor_rev") as u32,
+        },
+        payload_max: number("/spec/payload_max"),
+    };
+    assert_eq!(IRB_930, arm);
+}
 
 #[test]
 fn forward_kinematics() {
