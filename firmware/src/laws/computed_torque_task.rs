@@ -10,7 +10,7 @@ use protocol::messages::Compensation;
 
 use super::{Gains, Memory, Situation, computed_torque};
 use crate::jacobian::Jacobian;
-use crate::kinematics;
+use crate::kinematics::{self, Trig};
 use crate::math::wrap;
 
 /// Joint torques.
@@ -20,29 +20,50 @@ pub fn torque(
     compensation: Compensation,
     memory: &mut Memory,
 ) -> Vector4<f32> {
-    let jacobian = Jacobian::new(&situation.arm.geometry, situation.trig);
-    let error = pose_error(situation);
-    let mut pull = jacobian.task_velocity(&situation.velocity_error()) * gains.derivative()
-        + error * gains.proportional();
+    let task = TaskError::new(situation);
+    let mut pull = task.velocity * gains.derivative() + task.position * gains.proportional();
     if compensation == Compensation::Integral {
-        pull += memory.integrate(&error, situation) * gains.integral();
+        pull += memory.integrate(&task.position, situation) * gains.integral();
     }
-    // mu_d'' = J qdd_d + J'(q, qd_d) qd_d: the part J qdd_d passes through J^-1 unchanged, so only
-    // the difference of the two rate products has to be mapped.
-    let rates = jacobian.bias(&situation.ahead.qd) - jacobian.bias(&situation.velocity_ahead());
-    let acceleration = situation.ahead.qdd + jacobian.joint_speed_damped(&(pull + rates));
+    let ahead = &situation.ahead;
+    let desired = task.desired.task_velocity(&ahead.qdd) + task.desired.bias(&ahead.qd);
+    let carried = task.actual.bias(&situation.velocity_ahead());
+    let acceleration = task.actual.joint_speed_damped(&(desired - carried + pull));
     computed_torque::realise(situation, &acceleration, gains, compensation, memory)
 }
 
-/// Tool pose error mu_d - mu: m, m, m, rad (wrapped).
-pub(super) fn pose_error(situation: &Situation<'_>) -> Vector4<f32> {
-    let geometry = &situation.arm.geometry;
-    let desired = kinematics::forward(geometry, &situation.reference.q);
-    let actual = kinematics::forward_with(geometry, situation.trig, &situation.q);
-    Vector4::new(
-        desired.x - actual.x,
-        desired.y - actual.y,
-        desired.z - actual.z,
-        wrap(desired.yaw - actual.yaw),
-    )
+/// Where the tool is not, and how fast it does not move.
+pub(super) struct TaskError {
+    /// Jacobian at the reference.
+    pub(super) desired: Jacobian,
+    /// Jacobian at the measured position.
+    pub(super) actual: Jacobian,
+    /// mu_d - mu: m, m, m, rad (wrapped).
+    pub(super) position: Vector4<f32>,
+    /// mu_d' - mu', means over the last sample.
+    pub(super) velocity: Vector4<f32>,
+}
+
+impl TaskError {
+    pub(super) fn new(situation: &Situation<'_>) -> Self {
+        let geometry = &situation.arm.geometry;
+        let q_desired = &situation.reference.q;
+        let trig_desired = Trig::new(q_desired);
+        let mu_desired = kinematics::forward_with(geometry, &trig_desired, q_desired);
+        let mu = kinematics::forward_with(geometry, situation.trig, &situation.q);
+        let desired = Jacobian::new(geometry, &trig_desired);
+        let actual = Jacobian::new(geometry, situation.trig);
+        Self {
+            position: Vector4::new(
+                mu_desired.x - mu.x,
+                mu_desired.y - mu.y,
+                mu_desired.z - mu.z,
+                wrap(mu_desired.yaw - mu.yaw),
+            ),
+            velocity: desired.task_velocity(&situation.mean_qd)
+                - actual.task_velocity(&situation.qd),
+            desired,
+            actual,
+        }
+    }
 }

@@ -5,16 +5,14 @@
 
 use nalgebra::Vector4;
 
-use super::{Gains, Memory, Situation, computed_torque_task, velocity_loop};
-use crate::jacobian::Jacobian;
+use super::computed_torque_task::TaskError;
+use super::{Gains, Memory, Situation, velocity_loop};
 
 /// Joint torques of the velocity loop that follows the law's velocities.
 pub fn torque(situation: &Situation<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
-    let jacobian = Jacobian::new(&situation.arm.geometry, situation.trig);
-    let error = computed_torque_task::pose_error(situation);
-    // Away from the singularity J^-1 J qd_d is qd_d; near it both parts are damped alike.
-    let velocity =
-        jacobian.task_velocity(&situation.mean_qd) + error * velocity_loop::outer_gain(gains);
-    let command = jacobian.joint_speed_damped(&velocity);
+    let task = TaskError::new(situation);
+    let velocity = task.desired.task_velocity(&situation.mean_qd)
+        + task.position * velocity_loop::outer_gain(gains);
+    let command = task.actual.joint_speed_damped(&velocity);
     velocity_loop::torque(&command, situation, gains, memory)
 }

@@ -49,11 +49,12 @@ impl Capacity<'_> {
         room
     }
 
-    /// The largest time scale, at most 1, at which `reference` keeps every limit.
+    /// The largest time scale, at most 1, at which `reference` keeps every limit; of the limits
+    /// of speed, acceleration and jerk only `share`.
     ///
     /// # Errors
     /// [`RefusalReason::OutOfRange`] with the axis and torque that not even rest can hold.
-    pub fn time_scale(&self, reference: &Reference) -> Result<f32, Refusal> {
+    pub fn time_scale(&self, reference: &Reference, share: f32) -> Result<f32, Refusal> {
         let Self { arm, body } = self;
         let trig = Trig::new(&reference.q);
         let (qd, qdd) = (&reference.qd, &reference.qdd);
@@ -74,12 +75,12 @@ impl Capacity<'_> {
             .min(ratio(&arm.drive.motor_speed_limit, &drive.motor_speed(qd)));
         let acceleration = ratio(&limits.acceleration, qdd);
         let jerk = ratio(&limits.jerk, &reference.qddd);
-        let mut scale = joint.min(motor).min(speed);
-        if acceleration < 1.0 {
-            scale = scale.min(sqrt(acceleration));
+        let mut scale = joint.min(motor).min(speed * share);
+        if acceleration * share < 1.0 {
+            scale = scale.min(sqrt(acceleration * share));
         }
-        if jerk < 1.0 {
-            scale = scale.min(libm::cbrtf(jerk));
+        if jerk * share < 1.0 {
+            scale = scale.min(libm::cbrtf(jerk * share));
         }
         Ok(scale)
     }

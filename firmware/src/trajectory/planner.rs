@@ -37,6 +37,8 @@ const ROUNDS: u8 = 5;
 const BALANCE_POINTS: u8 = 12;
 /// Samples of the last pass.
 const VERIFY_POINTS: u8 = 96;
+/// Share of the limits of speed, acceleration and jerk that the samples of a line may use.
+const LINE_SHARE: f32 = 0.9;
 /// A correction of an acceleration by more than this factor waits for the next round.
 const STEP: f32 = 1.6;
 /// Moves whose every axis travels less than this (rad or m) end where they begin.
@@ -87,6 +89,7 @@ enum Stage {
     Verify {
         point: u8,
         rate: f32,
+        before: Option<Vector4<f32>>,
     },
 }
 
@@ -109,6 +112,14 @@ struct Gate {
 }
 
 impl Planner {
+    /// Calls of [`Planner::work`] after which a plan is complete or refused.
+    pub const MAX_TICKS: u32 = {
+        let survey = SURVEY_POINTS as u32 + 1;
+        let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
+        let verify = VERIFY_POINTS as u32 + 1;
+        (survey + balance + verify).div_ceil(SAMPLES_PER_TICK as u32)
+    };
+
     /// An idle planner.
     pub fn new() -> Self {
         Self {
@@ -221,7 +232,11 @@ impl Planner {
                 Stage::Idle => return None,
                 Stage::Survey { point, fastest } => self.survey(capacity, point, fastest),
                 Stage::Balance { round, point, gain } => self.balance(capacity, round, point, gain),
-                Stage::Verify { point, rate } => self.verify(capacity, point, rate),
+                Stage::Verify {
+                    point,
+                    rate,
+                    before,
+                } => self.verify(capacity, point, rate, before),
             };
             match done {
                 Ok(None) => {}
@@ -291,6 +306,7 @@ impl Planner {
             Stage::Verify {
                 point: 0,
                 rate: 1.0,
+                before: None,
             }
         };
         Ok(None)
@@ -345,26 +361,38 @@ impl Planner {
             Stage::Verify {
                 point: 0,
                 rate: 1.0,
+                before: None,
             }
         };
         Ok(None)
     }
 
-    /// One sample of the whole move; at the end, the trajectory.
+    /// One sample of the whole move; at the end, the trajectory. `before` is the acceleration of
+    /// the sample before.
     fn verify(
         &mut self,
         capacity: &Capacity<'_>,
         point: u8,
         rate: f32,
+        before: Option<Vector4<f32>>,
     ) -> Result<Option<Trajectory>, Refusal> {
-        let t = self.draft.span * f32::from(point) / f32::from(VERIFY_POINTS);
-        let reference = self.draft.at(capacity.arm, t).map_err(from_path)?;
-        let rate = rate.min(capacity.time_scale(&reference)?);
+        let interval = self.draft.span / f32::from(VERIFY_POINTS);
+        let t = interval * f32::from(point);
+        let mut reference = self.draft.at(capacity.arm, t).map_err(from_path)?;
+        // Along a line the joint accelerations bend between the samples, and the jerk has a part
+        // that only their difference shows. Straight in joint space all of it is exact.
+        let curved = matches!(self.draft.path, Path::Line { .. });
+        if curved && let Some(before) = before {
+            reference.qddd = (reference.qdd - before) / interval;
+        }
+        let share = if curved { LINE_SHARE } else { 1.0 };
+        let rate = rate.min(capacity.time_scale(&reference, share)?);
         self.draft.braking = self.draft.braking.sup(&reference.qdd.abs());
         if point < VERIFY_POINTS {
             self.stage = Stage::Verify {
                 point: point + 1,
                 rate,
+                before: Some(reference.qdd),
             };
             return Ok(None);
         }

@@ -1,0 +1,338 @@
+//! Planned motion against the limits of the robot, judged by the recursive Newton-Euler dynamics that
+//! planner does not use.
+
+use firmware::arm::{ArmModel, IRB_930, Payload};
+use firmware::body::Body;
+use firmware::dynamics::newton_euler;
+use firmware::kinematics::{self, Pose};
+use firmware::trajectory::Trajectory;
+use firmware::trajectory::capacity::Capacity;
+use firmware::trajectory::planner::{Planner, Request, Target};
+use nalgebra::{Vector3, Vector4};
+use proptest::prelude::*;
+use protocol::messages::{Refusal, RefusalReason};
+
+const GATE_A: Pose = Pose {
+    x: 0.493_934,
+    y: 0.106_066,
+    z: -0.2713,
+    yaw: 0.0,
+};
+const GATE_B: Pose = Pose {
+    x: 0.706_066,
+    y: -0.106_066,
+    z: -0.2713,
+    yaw: 0.0,
+};
+
+fn two_kg() -> Payload {
+    Payload {
+        mass: 2.0,
+        com: Vector3::new(0.0, 0.0, 0.05),
+        inertia: Vector3::new(0.008, 0.008, 0.01),
+    }
+}
+
+/// Plans to the end; the number of ticks is bounded.
+fn plan(
+    arm: &ArmModel,
+    payload: &Payload,
+    from: &Vector4<f32>,
+    target: Target,
+    speed: f32,
+) -> Result<Trajectory, Refusal> {
+    let body = Body::new(arm, payload);
+    let capacity = Capacity { arm, body: &body };
+    let mut planner = Planner::new();
+    planner.begin(
+        arm,
+        &Request {
+            sequence: 1,
+            target,
+            speed,
+        },
+        from,
+    )?;
+    for _ in 0..Planner::MAX_TICKS {
+        if let Some(result) = planner.work(&capacity) {
+            return result;
+        }
+    }
+    panic!("not planned within {} ticks", Planner::MAX_TICKS)
+}
+
+/// Walks a trajectory and holds every sample against every limit.
+///
+/// Samples lie eight times as dense as the planner's own, so what it could not see between two of
+/// its samples shows here: it must stay within what the planner holds back.
+fn check(arm: &ArmModel, payload: &Payload, trajectory: &Trajectory) -> Result<(), TestCaseError> {
+    let body = Body::new(arm, payload);
+    let duration = trajectory.duration();
+    let steps = 800;
+    let slack = 1.0 + 1e-3;
+    let mut previous: Option<(Vector4<f32>, Vector4<f32>)> = None;
+    for i in 0..=steps {
+        let t = duration * i as f32 / steps as f32;
+        let r = trajectory
+            .at(arm, t)
+            .expect("a planned path stays in reach");
+        let torque = newton_euler::inverse(arm, payload, &r.q, &r.qd, &r.qdd)
+            + body.drive.rotor_inertia() * r.qdd
+            + body.drive.friction(&r.qd);
+        let motor = body.drive.motor_torque(&torque);
+        for axis in 0..4 {
+            let limits = &arm.limits;
+            prop_assert!(
+                r.q[axis] >= limits.lower[axis] - 1e-5 && r.q[axis] <= limits.upper[axis] + 1e-5
+            );
+            prop_assert!(
+                r.qd[axis].abs() <= limits.velocity[axis] * slack,
+                "speed {axis} {}",
+                r.qd[axis]
+            );
+            prop_assert!(
+                r.qdd[axis].abs() <= limits.acceleration[axis] * slack,
+                "acceleration {axis} {}",
+                r.qdd[axis]
+            );
+            prop_assert!(
+                torque[axis].abs() <= limits.effort[axis],
+                "effort {axis} {}",
+                torque[axis]
+            );
+            prop_assert!(
+                motor[axis].abs() <= arm.drive.motor_torque_limit[axis],
+                "motor {axis} {}",
+                motor[axis]
+            );
+        }
+        // Positions, speeds and accelerations belong together: no jump between two samples.
+        if let Some((before, acceleration)) = previous {
+            let h = duration / steps as f32;
+            for axis in 0..4 {
+                let bound = arm.limits.velocity[axis] * h * slack + 1e-5;
+                prop_assert!((r.q[axis] - before[axis]).abs() <= bound);
+                // Jerk by differences: along a line the reference's own leaves a part out.
+                // f32 accelerations of up to 600 rad/s^2, each off by some 20 u.
+                let jerk = (r.qdd[axis] - acceleration[axis]).abs() / h;
+                let noise = 20.0 * f32::EPSILON * arm.limits.acceleration[axis] / h;
+                prop_assert!(
+                    jerk <= arm.limits.jerk[axis] * slack + noise,
+                    "jerk {axis} {jerk}"
+                );
+            }
+        }
+        previous = Some((r.q, r.qdd));
+    }
+    let end = trajectory.at(arm, duration * 1.01).expect("in reach");
+    prop_assert!((end.q - trajectory.end).amax() < 1e-5);
+    prop_assert_eq!(end.qd, Vector4::zeros());
+    Ok(())
+}
+
+fn joints() -> impl Strategy<Value = Vector4<f32>> {
+    (-2.6f32..2.6, -2.5f32..2.5, 0.0f32..0.3, -6.9f32..6.9)
+        .prop_map(|(a, b, c, d)| Vector4::new(a, b, c, d))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    #[test]
+    fn joint_moves_keep_every_limit(from in joints(), to in joints(), mass in 0.0f32..22.0, speed in 0.05f32..1.0) {
+        let payload = Payload { mass, ..two_kg() };
+        let trajectory = plan(&IRB_930, &payload, &from, Target::Joints(to), speed).unwrap();
+        check(&IRB_930, &payload, &trajectory)?;
+        prop_assert!((trajectory.end - to).amax() < 1e-5);
+    }
+
+    #[test]
+    fn jumps_keep_every_limit(
+        r0 in 0.4f32..0.95, a0 in -1.0f32..1.0, r1 in 0.4f32..0.95, a1 in -1.0f32..1.0,
+        rise in 0.0f32..0.1, clearance in 0.0f32..0.05, mass in 0.0f32..22.0,
+    ) {
+        let payload = Payload { mass, ..two_kg() };
+        let pose = |r: f32, a: f32| Pose { x: r * a.cos(), y: r * a.sin(), z: -0.3, yaw: 0.0 };
+        let from = kinematics::inverse(&IRB_930, &pose(r0, a0), kinematics::Elbow::Positive, &Vector4::zeros());
+        let Ok(from) = from else { return Ok(()) };
+        let top = -0.3 + rise;
+        let target = Target::Jump { pose: pose(r1, a1), top, clearance };
+        let Ok(trajectory) = plan(&IRB_930, &payload, &from, target, 1.0) else { return Ok(()) };
+        check(&IRB_930, &payload, &trajectory)?;
+        // The gate: while the tool is lower than the clearance above its ends, it stands over them.
+        for i in 0..=400 {
+            let t = trajectory.duration() * i as f32 / 400.0;
+            let r = trajectory.at(&IRB_930, t).unwrap();
+            let tool = kinematics::forward(&IRB_930.geometry, &r.q);
+            prop_assert!(tool.z <= top + 1e-5);
+            let near = |p: &Pose| (tool.x - p.x).hypot(tool.y - p.y) < 1e-4;
+            if tool.z < -0.3 + clearance.min(rise) - 1e-4 {
+                prop_assert!(near(&pose(r0, a0)) || near(&pose(r1, a1)), "t {t} z {}", tool.z);
+            }
+        }
+    }
+
+    #[test]
+    fn lines_are_straight_and_keep_every_limit(
+        x0 in 0.4f32..0.8, y0 in -0.3f32..0.3, x1 in 0.4f32..0.8, y1 in -0.3f32..0.3,
+        z1 in -0.4f32..-0.13, yaw in -2.0f32..2.0,
+    ) {
+        let start = Pose { x: x0, y: y0, z: -0.2, yaw: 0.0 };
+        let end = Pose { x: x1, y: y1, z: z1, yaw };
+        let from = kinematics::inverse(&IRB_930, &start, kinematics::Elbow::Positive, &Vector4::zeros()).unwrap();
+        let Ok(trajectory) = plan(&IRB_930, &two_kg(), &from, Target::Line(end), 1.0) else { return Ok(()) };
+        check(&IRB_930, &two_kg(), &trajectory)?;
+        let along = Vector3::new(x1 - x0, y1 - y0, z1 + 0.2);
+        for i in 0..=200 {
+            let t = trajectory.duration() * i as f32 / 200.0;
+            let r = trajectory.at(&IRB_930, t).unwrap();
+            let tool = kinematics::forward(&IRB_930.geometry, &r.q);
+            let offset = Vector3::new(tool.x - x0, tool.y - y0, tool.z + 0.2);
+            let aside = offset - along * (offset.dot(&along) / along.dot(&along).max(1e-9));
+            // f32 kinematics there and back: some 10 u of a metre.
+            let aside = aside.dot(&aside).sqrt();
+            prop_assert!(aside < 2e-6, "{aside} aside");
+        }
+    }
+}
+
+/// Analytic derivatives of a line against differences of its positions.
+#[test]
+fn derivatives_of_a_line_belong_to_its_positions() {
+    let from = kinematics::inverse(
+        &IRB_930,
+        &GATE_A,
+        kinematics::Elbow::Positive,
+        &Vector4::zeros(),
+    )
+    .unwrap();
+    let target = Target::Line(Pose {
+        yaw: 1.0,
+        z: -0.2,
+        ..GATE_B
+    });
+    let trajectory = plan(&IRB_930, &two_kg(), &from, target, 0.5).unwrap();
+    let h = 1e-3;
+    for i in 1..100 {
+        let t = trajectory.duration() * i as f32 / 100.0;
+        let [before, here, after] = [t - h, t, t + h].map(|t| trajectory.at(&IRB_930, t).unwrap());
+        let qd = (after.q - before.q) / (2.0 * h);
+        let qdd = (after.qd - before.qd) / (2.0 * h);
+        // Differences of f32 positions: 2 u |q| / 2h = 2e-4; of speeds likewise; truncation h^2/6
+        // times the next derivatives, at most 40000 rad/s^3 here.
+        assert!((qd - here.qd).amax() < 1e-2, "{qd} {}", here.qd);
+        assert!((qdd - here.qdd).amax() < 40_000.0 * h, "{qdd} {}", here.qdd);
+    }
+}
+
+#[test]
+fn the_gate_fills_the_torque_of_three_axes() {
+    let from = kinematics::inverse(
+        &IRB_930,
+        &GATE_A,
+        kinematics::Elbow::Positive,
+        &Vector4::zeros(),
+    )
+    .unwrap();
+    let target = Target::Jump {
+        pose: GATE_B,
+        top: -0.2463,
+        clearance: 0.005,
+    };
+    let there = plan(&IRB_930, &two_kg(), &from, target, 1.0).unwrap();
+    let back = Target::Jump {
+        pose: GATE_A,
+        top: -0.2463,
+        clearance: 0.005,
+    };
+    let back = plan(&IRB_930, &two_kg(), &there.end, back, 1.0).unwrap();
+    assert!(
+        there.duration() + back.duration() < 0.38,
+        "{}",
+        there.duration() + back.duration()
+    );
+    let body = Body::new(&IRB_930, &two_kg());
+    let mut peak = Vector4::<f32>::zeros();
+    for i in 0..=1000 {
+        let r = there
+            .at(&IRB_930, there.duration() * i as f32 / 1000.0)
+            .unwrap();
+        let trig = kinematics::Trig::new(&r.q);
+        peak = peak.sup(&body.inverse(&trig, &r.qd, &r.qdd).abs());
+    }
+    let share = peak.component_div(&IRB_930.limits.effort);
+    assert!(
+        share.x > 0.85 && share.y > 0.85 && share.z > 0.85,
+        "{share}"
+    );
+}
+
+#[test]
+fn refusals_name_axis_value_and_limit() {
+    let home = Vector4::new(0.0, 1.5, 0.15, 0.0);
+    let refuse = |target| plan(&IRB_930, &two_kg(), &home, target, 1.0).unwrap_err();
+    let far = refuse(Target::Line(Pose {
+        x: 2.0,
+        y: 0.0,
+        z: -0.2,
+        yaw: 0.0,
+    }));
+    assert_eq!(far.reason, RefusalReason::TooFar);
+    assert_eq!((far.value, far.limit), (2.0, IRB_930.geometry.reach()));
+    let limit = refuse(Target::Joints(Vector4::new(0.0, 3.0, 0.1, 0.0)));
+    assert_eq!(
+        (limit.reason, limit.axis, limit.value),
+        (RefusalReason::JointLimit, 1, 3.0)
+    );
+    let low = refuse(Target::Jump {
+        pose: GATE_B,
+        top: 1.0,
+        clearance: 0.0,
+    });
+    assert_eq!((low.reason, low.axis), (RefusalReason::JointLimit, 2));
+    let below = refuse(Target::Jump {
+        pose: GATE_B,
+        top: -0.3,
+        clearance: 0.0,
+    });
+    assert_eq!(below.reason, RefusalReason::OutOfRange);
+    let nan = refuse(Target::Joints(Vector4::new(f32::NAN, 0.0, 0.0, 0.0)));
+    assert_eq!(nan.reason, RefusalReason::NotFinite);
+    // Through the stretched arm: both ends are fine, the way is not.
+    let bent = Vector4::new(-0.4, 0.4, 0.1, 0.0);
+    let start = kinematics::forward(&IRB_930.geometry, &bent);
+    let across = Target::Line(Pose {
+        y: -start.y - 0.2,
+        x: start.x - 0.3,
+        ..start
+    });
+    let beyond = Target::Line(Pose {
+        x: 1.0499,
+        y: 0.0,
+        z: start.z,
+        yaw: 0.0,
+    });
+    let singular = plan(&IRB_930, &two_kg(), &bent, beyond, 1.0).unwrap_err();
+    assert_eq!(singular.reason, RefusalReason::Singular);
+    assert!(singular.value < singular.limit);
+    assert!(plan(&IRB_930, &two_kg(), &bent, across, 1.0).is_ok());
+    let fast = plan(&IRB_930, &two_kg(), &home, Target::Joints(home), 1.5).unwrap_err();
+    assert_eq!(fast.reason, RefusalReason::OutOfRange);
+    // A payload that no lift of this robot can hold.
+    let anvil = Payload {
+        mass: 90.0,
+        ..two_kg()
+    };
+    let heavy = plan(
+        &IRB_930,
+        &anvil,
+        &home,
+        Target::Joints(Vector4::new(0.0, 1.5, 0.2, 0.0)),
+        1.0,
+    )
+    .unwrap_err();
+    assert_eq!(
+        (heavy.reason, heavy.axis),
+        (RefusalReason::TorqueTooSmall, 2)
+    );
+}
