@@ -8,6 +8,12 @@
 //! for modified frames. Here a joint rate acts about z of the frame before, moments are taken at the origin of the frame
 //! before, and effort is the part along its z axis. The recursion starts with the base accelerating upwards at g, which the
 //! paper leaves out, so gravity needs no term of its own.
+//!
+//! # Accuracy
+//!
+//! An effort is off by at most 106 u (u = 2^-24) times the value that the same recursion gives on lengths, every horizontal vector
+//! replaced by its length and every difference by a sum: 12 roundings a frame on the way out, 12 on the way in, 10 at
+//! the body.
 
 use core::ops::Add;
 
