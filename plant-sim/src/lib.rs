@@ -6,6 +6,7 @@ pub mod bus;
 mod convert;
 pub mod drives;
 pub mod endpoint;
+pub mod eval;
 pub mod metrics;
 pub mod model;
 pub mod operator;

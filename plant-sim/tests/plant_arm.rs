@@ -83,9 +83,9 @@ impl Oracle {
     /// Linear and angular Jacobian of a point fixed to a link, by cross products.
     fn jacobian(frames: &[Matrix4<f64>; 5], link: usize, point: &Vector3<f64>) -> (Half, Half) {
         let (mut linear, mut angular) = (Half::zeros(), Half::zeros());
-        for joint in 0..=link {
-            let axis: Vector3<f64> = frames[joint].fixed_view::<3, 1>(0, 2).into();
-            let origin: Vector3<f64> = frames[joint].fixed_view::<3, 1>(0, 3).into();
+        for (joint, frame) in frames.iter().take(link + 1).enumerate() {
+            let axis: Vector3<f64> = frame.fixed_view::<3, 1>(0, 2).into();
+            let origin: Vector3<f64> = frame.fixed_view::<3, 1>(0, 3).into();
             if joint == 2 {
                 linear.set_column(joint, &axis);
             } else {

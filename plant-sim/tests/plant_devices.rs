@@ -278,7 +278,7 @@ fn an_encoder_wraps_as_its_register_does() {
 
 proptest! {
     #[test]
-    fn an_encoder_is_off_by_half_a_count(angle in -1e4..1e4, counts in 1u32..1_000_000) {
+    fn an_encoder_is_off_by_half_a_count(angle in -1e4..1e4f64, counts in 1u32..1_000_000) {
         let encoder = Encoder::new(counts);
         prop_assume!(angle.abs() / TAU * f64::from(counts) < f64::from(i32::MAX));
         let error = encoder.angle(encoder.counts(angle)) - angle;

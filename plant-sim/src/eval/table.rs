@@ -1,0 +1,157 @@
+//! Which columns each table has, and where they stand in an input.
+
+use super::{EvalError, Table};
+
+impl Table {
+    /// Columns of numbers that a row must have, in groups of four.
+    fn inputs(self) -> Vec<String> {
+        match self {
+            Self::Kinematics => numbered(&["q", "qd"], 4),
+            Self::Ik => ["x", "y", "z", "yaw"].map(str::to_owned).into(),
+            Self::Dynamics | Self::Actuation => numbered(&["q", "qd", "qdd"], 4),
+        }
+    }
+
+    /// Columns that are passed on as they are.
+    fn labels(self) -> &'static [&'static str] {
+        match self {
+            Self::Kinematics | Self::Actuation => &["id"],
+            Self::Ik => &["id", "kind"],
+            Self::Dynamics => &["id", "payload"],
+        }
+    }
+
+    /// Columns that are computed.
+    pub(super) fn results(self) -> Vec<String> {
+        let plain = |names: &[&str]| {
+            names
+                .iter()
+                .map(|&name| name.to_owned())
+                .collect::<Vec<_>>()
+        };
+        match self {
+            Self::Kinematics => [
+                plain(&["x", "y", "z", "yaw"]),
+                matrix("R", 3, 3),
+                matrix("J", 6, 4),
+                plain(&["vx", "vy", "vz", "wx", "wy", "wz"]),
+                numbered(&["Jdqd"], 6),
+            ]
+            .concat(),
+            Self::Ik => [
+                plain(&["reason"]),
+                numbered(&["a_q"], 4),
+                plain(&["a_in_limits"]),
+                numbered(&["b_q"], 4),
+                plain(&["b_in_limits", "detJ_a", "tol_theta2"]),
+            ]
+            .concat(),
+            Self::Dynamics => [
+                numbered(&["tau"], 4),
+                matrix("M", 4, 4),
+                numbered(&["n", "g"], 4),
+            ]
+            .concat(),
+            Self::Actuation => numbered(
+                &[
+                    "tau_link",
+                    "tau_rotor",
+                    "tau_fric",
+                    "tau_joint_total",
+                    "tau_motor",
+                    "phi_motor",
+                    "phid_motor",
+                ],
+                4,
+            ),
+        }
+    }
+}
+
+/// `a1 .. aN, b1 .. bN` for prefixes a, b.
+fn numbered(prefixes: &[&str], count: usize) -> Vec<String> {
+    prefixes
+        .iter()
+        .flat_map(|prefix| (1..=count).map(move |i| format!("{prefix}{i}")))
+        .collect()
+}
+
+/// `M11 .. MRC`, row first.
+fn matrix(prefix: &str, rows: usize, columns: usize) -> Vec<String> {
+    (1..=rows)
+        .flat_map(|r| (1..=columns).map(move |c| format!("{prefix}{r}{c}")))
+        .collect()
+}
+
+/// Where the columns of a table stand in an input.
+pub(super) struct Layout {
+    inputs: Vec<usize>,
+    /// Columns to pass on.
+    pub(super) labels: Vec<usize>,
+    largest: f64,
+}
+
+impl Layout {
+    pub(super) fn new(table: Table, header: &[String], largest: f64) -> Result<Self, EvalError> {
+        let required = table.inputs();
+        let labels: Vec<String> = table.labels().iter().map(|&name| name.to_owned()).collect();
+        let allowed = [labels.clone(), required.clone(), table.results()].concat();
+        for (i, column) in header.iter().enumerate() {
+            if !allowed.iter().any(|name| name == column) {
+                return Err(EvalError::UnknownColumn {
+                    column: column.to_owned(),
+                    allowed: allowed.join(", "),
+                });
+            }
+            if header.iter().take(i).any(|earlier| earlier == column) {
+                return Err(EvalError::RepeatedColumn {
+                    column: column.to_owned(),
+                });
+            }
+        }
+        let position = |name: &String| header.iter().position(|column| column == name);
+        let inputs = required.iter().map(|name| {
+            position(name).ok_or_else(|| EvalError::MissingColumn {
+                column: name.clone(),
+                required: required.join(", "),
+            })
+        });
+        Ok(Self {
+            inputs: inputs.collect::<Result<_, _>>()?,
+            labels: labels.iter().filter_map(position).collect(),
+            largest,
+        })
+    }
+
+    /// The input numbers of a row.
+    pub(super) fn read(
+        &self,
+        header: &[String],
+        line: usize,
+        record: &[String],
+    ) -> Result<Vec<f64>, EvalError> {
+        if record.len() > header.len() {
+            return Err(EvalError::TooManyValues {
+                line,
+                found: record.len(),
+                allowed: header.len(),
+            });
+        }
+        let wrong = |column: usize, found: &str| EvalError::Value {
+            line,
+            column: header[column].to_owned(),
+            found: found.to_owned(),
+            max: self.largest,
+        };
+        if record.len() < header.len() {
+            return Err(wrong(record.len(), ""));
+        }
+        let number = |&column: &usize| {
+            let text = &record[column];
+            // NaN and infinities parse, but are no states of a robot; neither is what an f32 cannot hold.
+            let number = text.parse().ok().filter(|x: &f64| x.abs() <= self.largest);
+            number.ok_or_else(|| wrong(column, text))
+        };
+        self.inputs.iter().map(number).collect()
+    }
+}
