@@ -4,6 +4,7 @@
 
 pub mod bus;
 mod convert;
+pub mod dbc;
 pub mod drives;
 pub mod endpoint;
 pub mod eval;

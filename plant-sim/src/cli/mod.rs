@@ -1,6 +1,8 @@
 //! The command line: one file a subcommand.
 
+mod dbc;
 mod run;
+mod trace;
 
 use std::io::{self, Write as _};
 use std::process::ExitCode;
@@ -22,6 +24,11 @@ struct Cli {
 enum Command {
     /// Run a scenario (the default command).
     Run(run::RunArgs),
+    /// Look into a recorded trace.
+    #[command(subcommand)]
+    Trace(trace::TraceCommand),
+    /// Write the messages of the link as a DBC file.
+    Dbc(dbc::DbcArgs),
 }
 
 /// Does what the command line says. An error is one message for the person who typed it.
@@ -30,6 +37,8 @@ pub fn main() -> Result<ExitCode, String> {
     match cli.command {
         None => run::run(&cli.run),
         Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Trace(command)) => trace::run(&command),
+        Some(Command::Dbc(args)) => dbc::run(&args),
     }
 }
 

@@ -45,6 +45,11 @@ impl<R: BufRead> Reader<R> {
         }
     }
 
+    /// Number of the line read last, counted from 1; 0 before the first.
+    pub fn line(&self) -> u64 {
+        self.line
+    }
+
     /// Fills the buffer with the next line, or with as much of it as any good line has; its line feed included.
     fn fill(&mut self) -> io::Result<()> {
         self.buffer.clear();

@@ -1,0 +1,28 @@
+//! `plant-sim dbc`: the messages for other CAN tools.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use plant_sim::dbc;
+
+use super::show;
+
+/// Arguments of `dbc`.
+#[derive(Args)]
+pub struct DbcArgs {
+    /// Write to this file instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Writes the DBC file.
+pub fn run(args: &DbcArgs) -> Result<ExitCode, String> {
+    let text = dbc::generate();
+    match &args.out {
+        Some(path) => std::fs::write(path, text)
+            .map_err(|error| format!("cannot write {}: {error}", path.display()))?,
+        None => show(&text)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
