@@ -1,0 +1,65 @@
+//! `controller`: the controller of the cabinet as a Linux process, on SocketCAN or a serial-line adapter.
+//!
+//! The same node as on the boards, with a socket for a CAN controller.
+
+mod clock;
+mod shell;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Parser;
+use firmware::arm::IRB_930;
+use firmware::controller::Config;
+use protocol::link::{Link, LinkAddress, realtime};
+
+use crate::clock::Clock;
+use crate::shell::Shell;
+
+/// Controller of a SCARA drive cabinet on a CAN bus. Waits for the drives, follows the operator, ends with Ctrl-C.
+#[derive(Parser)]
+#[command(name = "controller", version)]
+struct Args {
+    /// The bus: socketcan:INTERFACE, slcan:TERMINAL or slcan:tcp:HOST:PORT.
+    #[arg(long, value_name = "BUS")]
+    bus: LinkAddress,
+    /// Sampling rate of the drives.
+    #[arg(long, value_name = "HZ", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(100..=10_000))]
+    rate: u32,
+    /// Take the time from this machine and ask for real-time scheduling: for drives that sample in real time. Otherwise
+    /// time is counted in samples, for a plant that waits for each command (lock-step).
+    #[arg(long)]
+    real_time: bool,
+}
+
+fn main() -> ExitCode {
+    match run(&Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("controller: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> Result<(), String> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
+        .map_err(|error| format!("cannot handle Ctrl-C: {error}"))?;
+    let link = Link::open(&args.bus).map_err(|error| error.to_string())?;
+    let period_ns = (1e9 / f64::from(args.rate)).round();
+    let clock = if args.real_time {
+        for refused in realtime::claim() {
+            eprintln!("controller: {refused}");
+        }
+        Clock::real_time()
+    } else {
+        Clock::lock_step(period_ns as u64)
+    };
+    let config = Config::new(IRB_930, (period_ns * 1e-9) as f32);
+    Shell::new(link, args.bus.to_string(), config, clock)
+        .run(&stop)
+        .map_err(|error| error.to_string())
+}

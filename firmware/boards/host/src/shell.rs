@@ -1,0 +1,242 @@
+//! The loop around the node: waits for frames, tells the time, reports what changes.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+use firmware::controller::Config;
+use firmware::node::Node;
+use protocol::bus::{Bus, TransmitError};
+use protocol::codec;
+use protocol::frame::{CanFrame, Id};
+use protocol::link::{Link, LinkError, Stamped};
+use protocol::messages::{Message, Mode, NmtCommand, Node as Name};
+use protocol::schema::MessageInfo;
+
+use crate::clock::{Clock, is_feedback};
+
+/// How long a bus is listened to before taking part: three heartbeats.
+const LISTEN: Duration = Duration::from_millis(300);
+/// Longest wait for a frame: resolution of watchdogs and of Ctrl-C.
+const TICK: Duration = Duration::from_millis(5);
+/// Silence after which the drives are reported as gone.
+const SILENCE: Duration = Duration::from_secs(1);
+
+/// Why the controller ended.
+#[derive(Debug, thiserror::Error)]
+pub enum ShellError {
+    /// Another controller sends with our identifiers.
+    #[error(
+        "another controller is on {bus}: {name} (identifier {id:#05x}) was heard, which only a controller sends; \
+         stop one of the two"
+    )]
+    Duplicate {
+        /// Bus.
+        bus: String,
+        /// Message.
+        name: &'static str,
+        /// Its identifier.
+        id: u16,
+    },
+    /// The bus failed.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+}
+
+/// What happened, for the last line.
+#[derive(Default)]
+struct Counts {
+    feedback: u64,
+    late: u64,
+}
+
+pub struct Shell {
+    link: Link,
+    bus: String,
+    config: Config,
+    node: Node,
+    clock: Clock,
+    /// Sampling period if deadlines are real.
+    deadline: Option<Duration>,
+    mode: Mode,
+    /// Last feedback.
+    heard: Option<Instant>,
+    counts: Counts,
+}
+
+impl Shell {
+    pub fn new(link: Link, bus: String, config: Config, clock: Clock) -> Self {
+        let deadline =
+            matches!(clock, Clock::RealTime { .. }).then(|| Duration::from_secs_f32(config.period));
+        Self {
+            node: Node::new(config),
+            link,
+            bus,
+            config,
+            clock,
+            deadline,
+            mode: Mode::Boot,
+            heard: None,
+            counts: Counts::default(),
+        }
+    }
+
+    /// Controls until `stop` is set.
+    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), ShellError> {
+        self.listen(stop)?;
+        self.poll(None);
+        eprintln!("controller: waiting for the drives on {}", self.bus);
+        while !stop.load(Ordering::Relaxed) {
+            if self.link.wait(TICK)? {
+                while let Some(stamped) = self.link.take() {
+                    self.take(&stamped)?;
+                }
+            }
+            if self.clock.idle() {
+                self.poll(None);
+            }
+            self.report_silence();
+        }
+        eprintln!(
+            "controller: stopped in {} after {} samples, {} answered late; rejected: {}",
+            self.mode,
+            self.counts.feedback,
+            self.counts.late,
+            rejections(&self.node),
+        );
+        Ok(())
+    }
+
+    /// Hears what is on the bus before saying anything.
+    fn listen(&mut self, stop: &AtomicBool) -> Result<(), ShellError> {
+        let end = Instant::now() + LISTEN;
+        while !stop.load(Ordering::Relaxed) {
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                break;
+            }
+            self.link.wait(left.min(TICK))?;
+            while let Some(stamped) = self.link.take() {
+                self.refuse_duplicate(&stamped.frame)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, stamped: &Stamped) -> Result<(), ShellError> {
+        let frame = &stamped.frame;
+        self.refuse_duplicate(frame)?;
+        if is_reset(frame) {
+            eprintln!("controller: reset by network management");
+            self.node = Node::new(self.config);
+            self.clock.restart();
+            self.poll(None);
+            return Ok(());
+        }
+        self.clock.observe(frame);
+        self.poll(Some(*frame));
+        if is_feedback(frame) {
+            self.answered(stamped.at);
+        }
+        Ok(())
+    }
+
+    /// Lets the node look at one frame, or at the time alone.
+    fn poll(&mut self, received: Option<CanFrame>) {
+        let mut port = Port {
+            received,
+            link: &mut self.link,
+        };
+        self.node.poll(self.clock.now(), &mut port);
+        let controller = self.node.controller();
+        if controller.mode() != self.mode {
+            self.mode = controller.mode();
+            match self.mode {
+                Mode::FaultReaction | Mode::Fault | Mode::EStop => eprintln!(
+                    "controller: {}: {}",
+                    self.mode,
+                    controller.cause().describe()
+                ),
+                mode => eprintln!("controller: {mode}"),
+            }
+        }
+    }
+
+    /// Books a sample, and whether it was answered within its period.
+    fn answered(&mut self, at: SystemTime) {
+        if self.heard.is_none() {
+            eprintln!("controller: the drives are there");
+        }
+        self.heard = Some(Instant::now());
+        self.counts.feedback += 1;
+        // A clock that was set in between tells nothing.
+        let age = at.elapsed().unwrap_or_default();
+        if self.deadline.is_some_and(|period| age > period) {
+            self.counts.late += 1;
+            self.node.count_overrun();
+        }
+    }
+
+    fn report_silence(&mut self) {
+        if self.heard.is_some_and(|heard| heard.elapsed() > SILENCE) {
+            self.heard = None;
+            eprintln!(
+                "controller: the drives are silent; waiting for them on {}",
+                self.bus
+            );
+        }
+    }
+
+    fn refuse_duplicate(&self, frame: &CanFrame) -> Result<(), ShellError> {
+        let Id::Standard(id) = frame.id() else {
+            return Ok(());
+        };
+        match MessageInfo::of(id.as_raw()) {
+            Some(info) if info.sender == Some(Name::Controller) => Err(ShellError::Duplicate {
+                bus: self.bus.clone(),
+                name: info.name,
+                id: info.id,
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn is_reset(frame: &CanFrame) -> bool {
+    let Ok(codec::Received {
+        message: Message::Nmt(nmt),
+        ..
+    }) = codec::decode(frame)
+    else {
+        return false;
+    };
+    nmt.command == NmtCommand::ResetNode && (nmt.node == 0 || nmt.node == Name::Controller.code())
+}
+
+fn rejections(node: &Node) -> String {
+    let counts = node.rejections();
+    format!(
+        "{} undecodable, {} corrupted, {} duplicate, {} stale; {} lost, {} unsent",
+        counts.undecodable,
+        counts.corrupted,
+        counts.duplicate,
+        counts.stale,
+        counts.lost,
+        counts.unsent
+    )
+}
+
+/// The bus as the node sees it in one call: at most the frame that is due.
+struct Port<'a> {
+    received: Option<CanFrame>,
+    link: &'a mut Link,
+}
+
+impl Bus for Port<'_> {
+    fn receive(&mut self) -> Option<CanFrame> {
+        self.received.take()
+    }
+
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        self.link.transmit(frame)
+    }
+}

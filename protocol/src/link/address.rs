@@ -1,0 +1,89 @@
+//! Which bus: the text a person types after `--bus`.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::string::{String, ToString};
+
+/// A bus and the way to it: `socketcan:can0`, `slcan:/dev/ttyACM0` or `slcan:tcp:HOST:PORT`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LinkAddress {
+    /// Network interface.
+    SocketCan(String),
+    /// Serial-line adapter.
+    Slcan(SlcanPeer),
+}
+
+/// Other end of a serial line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SlcanPeer {
+    /// Terminal device.
+    Terminal(PathBuf),
+    /// TCP server, host and port.
+    Tcp(String),
+}
+
+/// The text is no address of a bus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AddressError {
+    /// What was typed.
+    pub text: String,
+}
+
+impl fmt::Display for AddressError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:?} is no bus; allowed: socketcan:INTERFACE (socketcan:can0), slcan:TERMINAL (slcan:/dev/ttyACM0), \
+             slcan:tcp:HOST:PORT (slcan:tcp:localhost:29536)",
+            self.text
+        )
+    }
+}
+
+impl core::error::Error for AddressError {}
+
+impl FromStr for LinkAddress {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        let address = match text.split_once(':') {
+            // Linux allows 15 bytes and neither blanks nor slashes in the name of an interface.
+            Some(("socketcan", name)) => ((1..=15).contains(&name.len())
+                && name
+                    .bytes()
+                    .all(|byte| byte.is_ascii_graphic() && byte != b'/'))
+            .then(|| Self::SocketCan(name.to_string())),
+            Some(("slcan", peer)) => match peer.strip_prefix("tcp:") {
+                Some(server) => server
+                    .rsplit_once(':')
+                    .filter(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok())
+                    .map(|_| SlcanPeer::Tcp(server.to_string())),
+                None => (!peer.is_empty()).then(|| SlcanPeer::Terminal(PathBuf::from(peer))),
+            }
+            .map(Self::Slcan),
+            _ => None,
+        };
+        address.ok_or_else(|| AddressError {
+            text: text.to_string(),
+        })
+    }
+}
+
+impl fmt::Display for LinkAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::SocketCan(interface) => write!(f, "socketcan:{interface}"),
+            Self::Slcan(peer) => write!(f, "slcan:{peer}"),
+        }
+    }
+}
+
+impl fmt::Display for SlcanPeer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Terminal(path) => write!(f, "{}", path.display()),
+            Self::Tcp(server) => write!(f, "tcp:{server}"),
+        }
+    }
+}
