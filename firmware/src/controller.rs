@@ -13,6 +13,7 @@ use protocol::messages::{
     Cause, Compensation, ControlWord, DriveStatus, Law, Mode, MotionReply, MotionRequest, Outcome,
     Refusal, RefusalReason,
 };
+use serde::{Deserialize, Serialize};
 
 use crate::arm::{ArmModel, Payload};
 use crate::body::Body;
@@ -32,7 +33,7 @@ pub const QUEUE: usize = 4;
 pub const MAX_GAP: u32 = 5;
 
 /// Everything a controller is told before it starts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// The robot.
     pub arm: ArmModel,
@@ -59,11 +60,7 @@ impl Config {
             selection: Selection {
                 law: Law::ComputedTorqueJoint,
                 compensation: Compensation::Observer,
-                gains: Gains {
-                    bandwidth: 120.0,
-                    damping: 1.0,
-                    observer: 60.0,
-                },
+                gains: Gains::for_period(period),
             },
             period,
             command_delay: 0.25e-3,

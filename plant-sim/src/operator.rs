@@ -278,6 +278,9 @@ impl Operator {
                 }
                 if self.reply.is_some() && request.is_move() {
                     self.last_move = Some(self.sequence);
+                } else if *request == MotionRequest::Stop {
+                    // What was under way will never be completed.
+                    self.last_move = None;
                 }
                 let what = format!("reply to request {} ({})", self.sequence, request.name());
                 (self.reply.is_some(), REPLY_LIMIT_NS, what)
@@ -336,6 +339,13 @@ fn program(scenario: &Scenario) -> Vec<Action> {
             compensation: scenario.law.compensation,
         }),
     ];
+    if let Some(gains) = &scenario.gains {
+        actions.push(Action::Request(MotionRequest::SetGains {
+            bandwidth: gains.bandwidth as f32,
+            damping: gains.damping as f32,
+            observer: gains.observer as f32,
+        }));
+    }
     if let Some(payload) = &scenario.payload {
         actions.extend([Action::Attach(carried(payload)), announce(payload)]);
     }
@@ -366,6 +376,10 @@ fn program(scenario: &Scenario) -> Vec<Action> {
                 Step::Dwell(seconds) => {
                     actions.extend([Action::WaitArrived, Action::Dwell((seconds * 1e9) as u64)])
                 }
+                Step::Stop(seconds) => actions.extend([
+                    Action::Dwell((seconds * 1e9) as u64),
+                    Action::Request(MotionRequest::Stop),
+                ]),
                 Step::Pick(payload) => actions.extend([
                     Action::WaitArrived,
                     Action::Attach(carried(payload)),

@@ -11,10 +11,14 @@ use firmware::arm::ArmModel;
 use firmware::controller::Config;
 use firmware::node::Node;
 use protocol::codec;
-use protocol::frame::CanFrame;
+use protocol::frame::{CanFrame, FD_MAX, StandardId};
 use protocol::messages::{Emergency, Message, Mode};
+use protocol::schema::{MessageInfo, Rate};
+use protocol::table;
 
-use crate::bus::{BitTiming, BuiltinBus, Delivery, FrameBits, NodeId, Statistics};
+use crate::bus::{
+    BitTiming, BuiltinBus, Delivery, FrameBits, NodeId, Overload, Statistics, Traffic,
+};
 use crate::drives::Drives;
 use crate::endpoint::{Endpoint, EndpointError};
 use crate::model::RobotModel;
@@ -162,6 +166,11 @@ impl<E: Endpoint> Rig<E> {
     /// Frames that found a full transmit queue.
     pub fn dropped(&self) -> u64 {
         self.dropped
+    }
+
+    /// Puts a frame of the operator's node onto the bus at the beginning of the next sample.
+    pub fn inject(&mut self, frame: &CanFrame) {
+        self.enqueue(self.operator_at, self.sample * self.period, frame);
     }
 
     /// Runs until the operator is done.
@@ -328,14 +337,44 @@ fn array(v: &nalgebra::Vector4<f32>) -> [f64; 4] {
 /// Time from a sample until its command acts, s: two frames and the computing time, on an
 /// otherwise idle bus with the mean of the stuff bits.
 fn command_delay(timing: &BitTiming) -> f32 {
-    let frame = |info: &protocol::schema::MessageInfo| {
-        let id =
-            protocol::frame::StandardId::new(info.id).unwrap_or(protocol::frame::StandardId::ZERO);
-        // Alternating bits need no stuff bits, equal ones the most: this pattern lies between.
-        let data = vec![0x0F; info.len];
-        CanFrame::fd(id, &data, true).map_or(0, |frame| timing.duration(FrameBits::exact(&frame)))
-    };
-    let feedback = frame(&protocol::table::FEEDBACK);
-    let command = frame(&protocol::table::COMMAND);
+    let frame = |info| timing.duration(FrameBits::exact(&specimen(info)));
+    let feedback = frame(&table::FEEDBACK);
+    let command = frame(&table::COMMAND);
     ((feedback + COMPUTE_NS + command) as f64 * 1e-9) as f32
+}
+
+/// A frame of this message, about half stuffed: alternating bits need no stuff bits, equal ones
+/// the most.
+fn specimen(info: &MessageInfo) -> CanFrame {
+    let id = StandardId::new(info.id).unwrap_or(StandardId::MAX);
+    let data = [0x0F; FD_MAX];
+    let data = &data[..info.len];
+    let frame = if info.is_fd() {
+        CanFrame::fd(id, data, true)
+    } else {
+        CanFrame::classical(id, data)
+    };
+    frame.expect("the message table holds lengths that frames can have")
+}
+
+/// Worst-case load of the bus at a control rate.
+///
+/// # Errors
+/// [`Overload`] with the number where it is more than a bus may carry.
+pub fn admit(timing: &BitTiming, rate_hz: f64) -> Result<f64, Overload> {
+    let traffic: Vec<Traffic> = table::TABLE
+        .iter()
+        .filter_map(|info| {
+            let rate = match info.rate {
+                Rate::EverySample => rate_hz,
+                Rate::Hertz(hertz) => f64::from(hertz),
+                Rate::Event => return None,
+            };
+            Some(Traffic {
+                frame: specimen(info),
+                rate,
+            })
+        })
+        .collect();
+    crate::bus::admit(timing, &traffic)
 }

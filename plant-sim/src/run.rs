@@ -6,18 +6,19 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use firmware::arm::ArmModel;
+use firmware::controller::Config;
 use protocol::frame::CanFrame;
 use protocol::messages::Emergency;
 use serde::Serialize;
 
 use crate::bus::BitTiming;
-use crate::endpoint::{Endpoint, InProcess};
+use crate::endpoint::{Endpoint, EndpointError, InProcess};
 use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
 use crate::model::RobotModel;
 use crate::operator::{Hand, Operator};
 use crate::plant::arm::Arm;
 use crate::plant::kinematics::{Pose, inverse};
-use crate::rig::{Observer, Rig, RigConfig, RunError, Truth};
+use crate::rig::{self, Observer, Rig, RigConfig, RunError, Truth};
 use crate::scenario::{PayloadSpec, Scenario, Step};
 use crate::trace::{Interface, LogHash, Writer};
 
@@ -63,6 +64,17 @@ pub enum ExecuteError {
         /// Reason.
         source: firmware::arm::ModelError,
     },
+    /// The bus cannot carry the messages at this rate.
+    #[error("at {rate_hz} Hz the {source}; lower the rate")]
+    Link {
+        /// Control rate.
+        rate_hz: f64,
+        /// Load.
+        source: crate::bus::Overload,
+    },
+    /// The controller could not be started.
+    #[error(transparent)]
+    Controller(#[from] EndpointError),
     /// Files cannot be written.
     #[error("cannot write to {}: {source}", path.display())]
     Output {
@@ -264,6 +276,18 @@ impl Progress {
 /// # Errors
 /// Nothing was run, or nothing could be written; see [`ExecuteError`].
 pub fn execute(config: &RunConfig, out: Option<&Path>) -> Result<Summary, ExecuteError> {
+    execute_with(config, out, |config| Ok(InProcess::new(config)))
+}
+
+/// Runs a scenario as [`execute`] does, with the controller that `connect` starts.
+///
+/// # Errors
+/// As [`execute`], and [`ExecuteError::Controller`] when `connect` fails.
+pub fn execute_with<E: Endpoint>(
+    config: &RunConfig,
+    out: Option<&Path>,
+    connect: impl FnOnce(Config) -> Result<E, EndpointError>,
+) -> Result<Summary, ExecuteError> {
     let scenario = &config.scenario;
     let believed = ArmModel::from(&config.model);
     believed.validate().map_err(|source| ExecuteError::Model {
@@ -282,6 +306,10 @@ pub fn execute(config: &RunConfig, out: Option<&Path>) -> Result<Summary, Execut
         rate_hz: scenario.rate_hz,
         timing: BitTiming::default(),
     };
+    rig::admit(&rig.timing, rig.rate_hz).map_err(|source| ExecuteError::Link {
+        rate_hz: rig.rate_hz,
+        source,
+    })?;
     let output = |path: &Path| {
         let path = path.to_path_buf();
         move |source| ExecuteError::Output { path, source }
@@ -314,7 +342,8 @@ pub fn execute(config: &RunConfig, out: Option<&Path>) -> Result<Summary, Execut
 
     let began = Instant::now();
     let mut operator = Operator::new(scenario);
-    let mut rig = Rig::new(&rig, InProcess::new(rig.controller()));
+    let controller = connect(rig.controller())?;
+    let mut rig = Rig::new(&rig, controller);
     let result = rig.run(&mut operator, &mut recorder);
     let wall = began.elapsed().as_secs_f64();
 
@@ -380,7 +409,7 @@ fn cycle_target(scenario: &Scenario, robot: &RobotModel) -> [f64; 3] {
             let pose = arm.pose(&arm.at(&joints.to.into()));
             Some([pose.x, pose.y, pose.z, pose.yaw])
         }
-        Step::Dwell(_) | Step::Pick(_) | Step::Place {} => None,
+        Step::Dwell(_) | Step::Stop(_) | Step::Pick(_) | Step::Place {} => None,
     });
     let [x, y, z, _] = last.unwrap_or(scenario.start);
     [x, y, z]

@@ -30,6 +30,9 @@ pub struct Scenario {
     pub rate_hz: f64,
     /// Control law and compensation, such as `computed-torque:observer`.
     pub law: LawChoice,
+    /// Gains, where not the controller's own.
+    #[serde(default)]
+    pub gains: Option<GainsSpec>,
     /// Tool pose at the start: x, y, z, yaw. The elbow is at the positive side.
     pub start: [f64; 4],
     /// What the flange carries from the start.
@@ -40,6 +43,18 @@ pub struct Scenario {
     pub mismatch: Mismatch,
     /// Steps of one cycle.
     pub cycle: Vec<Step>,
+}
+
+/// Gains of the closed loop, the same for every law.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GainsSpec {
+    /// Natural frequency of the error dynamics, rad/s.
+    pub bandwidth: f64,
+    /// Damping ratio.
+    pub damping: f64,
+    /// Corner of the disturbance observer, or 1 / integral time, rad/s.
+    pub observer: f64,
 }
 
 /// A payload as model files write it.
@@ -116,6 +131,8 @@ pub enum Step {
     Joints(Line),
     /// Wait until the arm has arrived, then this many seconds.
     Dwell(f64),
+    /// This many seconds after the last move was accepted, stop on the path.
+    Stop(f64),
     /// Take a payload and announce it.
     Pick(PayloadSpec),
     /// Let go of the payload and announce it.
@@ -262,9 +279,9 @@ impl Scenario {
                 Step::Line(Line { to, speed }) | Step::Joints(Line { to, speed }) => {
                     (to.to_vec(), *speed)
                 }
-                Step::Dwell(seconds) => {
+                Step::Dwell(seconds) | Step::Stop(seconds) => {
                     if !(0.0..=3600.0).contains(seconds) {
-                        return wrong("dwell", seconds.to_string(), "0 to 3600 s");
+                        return wrong("dwell or stop", seconds.to_string(), "0 to 3600 s");
                     }
                     (vec![], 1.0)
                 }
@@ -329,7 +346,7 @@ mod tests {
                 "cycles = 10\nspeeed = 1",
                 "unknown field `speeed`",
             ),
-            ("dwell = 0.25", "dwell = nan", "dwell is NaN"),
+            ("dwell = 0.25", "dwell = nan", "dwell or stop is NaN"),
             (
                 "computed-torque:observer",
                 "magic",

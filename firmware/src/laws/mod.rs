@@ -23,6 +23,7 @@ mod velocity_loop;
 
 use nalgebra::Vector4;
 use protocol::messages::{Compensation, Law, Refusal, RefusalReason};
+use serde::{Deserialize, Serialize};
 
 use crate::arm::ArmModel;
 use crate::body::Body;
@@ -35,7 +36,7 @@ const MAX_DAMPING: f32 = 5.0;
 
 /// Closed-loop gains, the same three numbers for every law and every robot: they are turned into
 /// accelerations, and inertia turns those into torque.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gains {
     /// Natural frequency of the error dynamics, rad/s.
     pub bandwidth: f32,
@@ -46,6 +47,16 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// Gains for an arm as stiff as the model says, sampled every `period` seconds: 150 rad/s,
+    /// or as much less as the delays of slow sampling ask for.
+    pub fn for_period(period: f32) -> Self {
+        Self {
+            bandwidth: 150.0f32.min(0.15 / period),
+            damping: 1.0,
+            observer: 100.0f32.min(0.1 / period),
+        }
+    }
+
     /// Refuses gains that cannot be stable at this sampling period.
     ///
     /// # Errors
@@ -163,7 +174,7 @@ impl Default for Memory {
 }
 
 /// A law, what helps it against friction and payload error, and its gains.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Selection {
     /// The law.
     pub law: Law,
