@@ -1,11 +1,13 @@
 //! What the controller knows of the arm it drives: geometry, links, limits, drive train, payload.
 //!
-//! Plain data with public fields, so that a robot is a constant. [`ArmModel::validate`] is the gate: past it, the
+//! Plain data with public fields, so that a robot is a constant, and serialisable, so that a robot can be sent to the
+//! controller of a board. [`ArmModel::validate`] is the gate: past it, the
 //! kinematics and dynamics of this crate have no division by zero and every mass matrix is positive definite.
 
 mod validate;
 
 use nalgebra::{Vector3, Vector4};
+use serde::{Deserialize, Serialize};
 
 pub use validate::{ModelError, Rule};
 
@@ -39,7 +41,7 @@ impl Axis {
 }
 
 /// A rigid body of the arm.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Link {
     /// Mass (kg).
     pub mass: f32,
@@ -52,7 +54,7 @@ pub struct Link {
 
 /// Lengths of the Denavit-Hartenberg table (paper, table 1). The twists, 0, pi, 0, 0, are what makes a SCARA and are
 /// built in.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Geometry {
     /// Length of arm 1 (m).
     pub a1: f32,
@@ -73,7 +75,7 @@ impl Geometry {
 }
 
 /// Limits of the axes, joint side: rad or m, and their rates.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct JointLimits {
     /// Least position.
     pub lower: Vector4<f32>,
@@ -92,7 +94,7 @@ pub struct JointLimits {
 }
 
 /// Motors and transmissions, in the order of the axes. Motor 3 drives the nut of the ball-screw spline.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DriveTrain {
     /// Motor turns per turn of the driven part (for the lift: of the screw nut).
     pub gear_ratio: Vector4<f32>,
@@ -120,7 +122,7 @@ pub struct DriveTrain {
 }
 
 /// A body held by the flange.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Payload {
     /// Mass (kg); zero for an empty flange.
     pub mass: f32,
@@ -140,7 +142,7 @@ impl Payload {
 }
 
 /// Everything the controller knows of an arm.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ArmModel {
     /// Lengths.
     pub geometry: Geometry,

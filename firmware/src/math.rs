@@ -1,4 +1,4 @@
-//! The elementary functions: the only source of `sin`, `cos`, `sqrt`, `atan2` and `tanh` in the controller.
+//! The elementary functions: the only source of `sin`, `cos`, `sqrt`, `cbrt`, `atan2` and `tanh` in the controller.
 //!
 //! Everything here is built from IEEE 754 `+ - * /`, comparisons and bit moves in `f32`, so host, emulator and silicon
 //! give the same bits. Every function is total; a NaN goes in and a NaN comes out.
@@ -80,6 +80,25 @@ const COS: [f32; 3] = [4.166_664_6e-2, -1.388_736_3e-3, 2.443_791_2e-5];
 #[must_use]
 pub fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
+}
+
+/// Cube root, error at most 2 u relative for |x| up to 2^126; a subnormal number counts as zero.
+///
+/// A third of the exponent gives five bits (the start of FreeBSD's `cbrtf`); each of Halley's steps gives three times as
+/// many. The error is that of the last sum (1 u) and a third of that of the cube (2 u). `libm` takes the same steps in
+/// `f64`, which is software on an M4F.
+#[must_use]
+pub fn cbrt(x: f32) -> f32 {
+    let size = x.abs();
+    if size < f32::MIN_POSITIVE {
+        return x * 0.0;
+    }
+    let mut root = f32::from_bits(size.to_bits() / 3 + 709_958_130);
+    for _ in 0..2 {
+        let cube = root * root * root;
+        root -= root * ((cube - size) / (2.0 * cube + size));
+    }
+    if x < 0.0 { -root } else { root }
 }
 
 /// Length of the vector (x, y). Error at most 2 u relative while the squares stay within the range of `f32`, as they

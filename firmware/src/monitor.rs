@@ -2,11 +2,12 @@
 
 use nalgebra::Vector4;
 use protocol::messages::{Cause, DriveStatus};
+use serde::{Deserialize, Serialize};
 
 use crate::arm::{ArmModel, Axis};
 
 /// Limits whose violation stops the arm.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MonitorLimits {
     /// Largest following error: rad, rad, m, rad.
     pub following_error: Vector4<f32>,

@@ -5,7 +5,7 @@ mod common;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use common::U;
-use firmware::math::{atan2, clamp, hypot, sin_cos, sqrt, tanh, wrap};
+use firmware::math::{atan2, cbrt, clamp, hypot, sin_cos, sqrt, tanh, wrap};
 use proptest::prelude::*;
 
 /// `count` points evenly over [-range, range], each with its neighbours in f32.
@@ -54,6 +54,23 @@ fn sine_and_cosine_keep_their_error() {
             }
         }
     }
+}
+
+#[test]
+fn the_cube_root_keeps_its_error() {
+    // Three octaves hold every remainder of the exponent; the extremes hold every range that is promised.
+    for octaves in [-126, -60, -3, 0, 60, 123] {
+        for step in 0..300_000 {
+            let x = (f64::from(octaves) + 3.0 * f64::from(step) / 300_000.0).exp2() as f32;
+            let exact = f64::from(x).cbrt();
+            let error = (f64::from(cbrt(x)) - exact).abs() / exact;
+            assert!(error <= 2.0 * U, "cbrt({x:e}) is off by {error:e}");
+            assert_eq!(cbrt(-x).to_bits(), (-cbrt(x)).to_bits());
+        }
+    }
+    assert_eq!(cbrt(0.0), 0.0);
+    assert_eq!(cbrt(1e-40), 0.0);
+    assert!(cbrt(f32::NAN).is_nan());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::profile::{Bounds, Sample};
 use crate::arm::{ArmModel, Axis};
 use crate::body::Body;
 use crate::kinematics::Trig;
-use crate::math::sqrt;
+use crate::math::{cbrt, clamp, sqrt};
 
 /// Share of the torque that a plan may use. The rest is for the feedback: payload and friction
 /// are never known exactly, and a saturated axis leaves the path.
@@ -80,7 +80,7 @@ impl Capacity<'_> {
             scale = scale.min(sqrt(acceleration * share));
         }
         if jerk * share < 1.0 {
-            scale = scale.min(libm::cbrtf(jerk * share));
+            scale = scale.min(cbrt(jerk * share));
         }
         Ok(scale)
     }
@@ -107,7 +107,7 @@ impl Capacity<'_> {
         let friction = self.arm.drive.coulomb.z + self.arm.drive.viscous.z * peak;
         let force = self.torque().z;
         // A stroke that the drive cannot hold is refused by the last pass: keep this positive.
-        let within = |force: f32| (force / mass).clamp(0.01 * cap, cap);
+        let within = |force: f32| clamp(force / mass, 0.01 * cap, cap);
         let up = Bounds {
             speed,
             accelerate: within(force - weight - friction),

@@ -10,7 +10,7 @@
 //!                         \____/     the other half, mirrored in time
 //! ```
 
-use crate::math::sqrt;
+use crate::math::{cbrt, sqrt};
 
 /// Value and first three time derivatives of the path coordinate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -153,7 +153,7 @@ impl SCurve {
         } = *bounds;
         // With jerk alone the peak speed would be this; no acceleration above the one that goes
         // with it is ever reached, and without it the quadratic below is a poor start.
-        let unlimited = libm::cbrtf(0.25 * distance * distance * jerk);
+        let unlimited = cbrt(0.25 * distance * distance * jerk);
         let reachable = sqrt(unlimited * jerk);
         let accelerate = accelerate.min(reachable);
         let brake = brake.min(reachable);

@@ -1,0 +1,77 @@
+//! Files of the host, by Arm semihosting (*Semihosting for AArch32 and AArch64*, Arm ABI documents).
+//!
+//! The crates for this offer files that can panic, which this image must not.
+
+use core::ffi::CStr;
+
+use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
+use cortex_m_semihosting::{nr, syscall};
+
+/// The host has gone, or speaks another language.
+pub struct End;
+
+/// Modes of `SYS_OPEN`: those of `fopen`, numbered.
+const READ_BINARY: usize = 1;
+const WRITE_BINARY: usize = 5;
+
+/// An open file of the host. Closed by the host when the emulation ends.
+pub struct File(usize);
+
+impl File {
+    /// Opens a file for reading; blocks on a FIFO until it has a writer.
+    pub fn open(path: &CStr) -> Result<Self, End> {
+        Self::with_mode(path, READ_BINARY)
+    }
+
+    /// Opens a file for writing; blocks on a FIFO until it has a reader.
+    pub fn create(path: &CStr) -> Result<Self, End> {
+        Self::with_mode(path, WRITE_BINARY)
+    }
+
+    fn with_mode(path: &CStr, mode: usize) -> Result<Self, End> {
+        let block = [path.as_ptr() as usize, mode, path.count_bytes()];
+        // SAFETY: SYS_OPEN takes address of a name that ends in zero, mode and length of the name, and only reads it.
+        match unsafe { syscall(nr::OPEN, &block) } {
+            usize::MAX => Err(End),
+            handle => Ok(Self(handle)),
+        }
+    }
+
+    /// Fills `buffer`; blocks until that many bytes have come.
+    pub fn read(&self, buffer: &mut [u8]) -> Result<(), End> {
+        let mut rest = buffer;
+        while !rest.is_empty() {
+            let block = [self.0, rest.as_mut_ptr() as usize, rest.len()];
+            // SAFETY: SYS_READ writes at most `len` bytes to the address, which is that of `rest`.
+            let missing = unsafe { syscall(nr::READ, &block) };
+            let read = rest.len().checked_sub(missing).ok_or(End)?;
+            if read == 0 {
+                return Err(End);
+            }
+            rest = rest.get_mut(read..).ok_or(End)?;
+        }
+        Ok(())
+    }
+
+    /// Writes all of `bytes`.
+    pub fn write(&self, bytes: &[u8]) -> Result<(), End> {
+        let block = [self.0, bytes.as_ptr() as usize, bytes.len()];
+        // SAFETY: SYS_WRITE reads `len` bytes from the address, which is that of `bytes`.
+        match unsafe { syscall(nr::WRITE, &block) } {
+            0 => Ok(()),
+            _ => Err(End),
+        }
+    }
+}
+
+/// Ends the emulation; the emulator's exit status is 0 or 1.
+pub fn exit(result: Result<(), End>) -> ! {
+    debug::exit(match result {
+        Ok(()) => EXIT_SUCCESS,
+        Err(End) => EXIT_FAILURE,
+    });
+    // Only a debugger that lets the program go on gets here.
+    loop {
+        cortex_m::asm::wfi();
+    }
+}

@@ -1,0 +1,305 @@
+//! The lock-step channel between the emulated board and the host that emulates it, compiled by both of its ends.
+//!
+//! Two FIFOs, which the board opens through Arm semihosting in the emulator's working directory. The host says once what
+//! the controller is to know ([`config_to_bytes`]), then asks ([`Request`]) and waits for the answer ([`Reply`]) for ever
+//! after; every record from the host has a fixed length. The host ends the conversation by closing its end. Numbers are
+//! little-endian, frames are in the layout of Linux's `struct canfd_frame`.
+//!
+//! This is the path for long comparisons: a round trip takes microseconds, where a UART takes milliseconds of emulation.
+//! What it carries are the frames of the bus, unchanged.
+
+#![no_std]
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::indexing_slicing
+    )
+)]
+
+use core::ffi::CStr;
+
+use firmware::controller::Config;
+use protocol::bus::TransmitError;
+use protocol::frame::{CanFrame, ExtendedId, FrameKind, Id, StandardId};
+
+/// FIFO that the host writes and the board reads.
+pub const TO_BOARD: &CStr = c"to-board";
+/// FIFO that the board writes and the host reads.
+pub const FROM_BOARD: &CStr = c"from-board";
+/// File that the board leaves behind when the host has closed its end: the most stack it has used, bytes, in decimal.
+pub const STACK_REPORT: &CStr = c"stack-used";
+
+/// Bytes of the configuration record; more than any configuration takes, the rest is zero.
+pub const CONFIG_LEN: usize = 768;
+/// Bytes of a frame: identifier and flags (4), length (1), FD flags (1), reserved (2), data (64).
+pub const FRAME_LEN: usize = 72;
+/// Bytes of a request: time (8), number of frames (1), frame.
+pub const REQUEST_LEN: usize = 9 + FRAME_LEN;
+/// Bytes of a reply before its frames: their number (4), timer ticks (4).
+pub const REPLY_HEADER: usize = 8;
+/// Frames that one poll may send: one control sample sends a handful, its reply queue at most eight more.
+pub const REPLY_FRAMES: usize = 16;
+
+const EXTENDED: u32 = 1 << 31;
+const REMOTE: u32 = 1 << 30;
+const BRS: u8 = 1;
+const ESI: u8 = 2;
+const FDF: u8 = 4;
+
+/// The record that tells the board its configuration, or `None` if it does not fit.
+#[must_use]
+pub fn config_to_bytes(config: &Config) -> Option<[u8; CONFIG_LEN]> {
+    let mut bytes = [0; CONFIG_LEN];
+    postcard::to_slice(config, &mut bytes).ok()?;
+    Some(bytes)
+}
+
+/// The configuration in a record, or `None` if there is none.
+#[must_use]
+pub fn config_from_bytes(bytes: &[u8; CONFIG_LEN]) -> Option<Config> {
+    postcard::from_bytes(bytes).ok()
+}
+
+/// One call of the node: the time, and the frame that has arrived.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Time, µs.
+    pub now: u64,
+    /// Frame, if one has come.
+    pub frame: Option<CanFrame>,
+}
+
+impl Request {
+    /// The record.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; REQUEST_LEN] {
+        let mut bytes = [0; REQUEST_LEN];
+        put(&mut bytes, 0, &self.now.to_le_bytes());
+        if let Some(frame) = &self.frame {
+            put(&mut bytes, 8, &[1]);
+            put(&mut bytes, 9, &frame_to_bytes(frame));
+        }
+        bytes
+    }
+
+    /// The request in a record, or `None` if it holds no valid frame where it says that there is one.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; REQUEST_LEN]) -> Option<Self> {
+        let (now, rest) = bytes.split_first_chunk::<8>()?;
+        let (&present, record) = rest.split_first()?;
+        let frame = match present {
+            0 => None,
+            _ => Some(frame_from_bytes(record.first_chunk()?)?),
+        };
+        Some(Self {
+            now: u64::from_le_bytes(*now),
+            frame,
+        })
+    }
+}
+
+/// What the node sent in one call, as a record that grows.
+#[derive(Clone, Debug)]
+pub struct Reply {
+    bytes: [u8; REPLY_HEADER + REPLY_FRAMES * FRAME_LEN],
+    frames: usize,
+}
+
+impl Default for Reply {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Reply {
+    /// No frame.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            bytes: [0; REPLY_HEADER + REPLY_FRAMES * FRAME_LEN],
+            frames: 0,
+        }
+    }
+
+    /// Forgets all frames.
+    pub fn clear(&mut self) {
+        self.frames = 0;
+    }
+
+    /// Appends a frame.
+    ///
+    /// # Errors
+    /// [`TransmitError::QueueFull`] after [`REPLY_FRAMES`] frames.
+    pub fn push(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        let at = REPLY_HEADER + self.frames * FRAME_LEN;
+        let record = self
+            .bytes
+            .get_mut(at..)
+            .and_then(<[u8]>::first_chunk_mut::<FRAME_LEN>)
+            .ok_or(TransmitError::QueueFull)?;
+        *record = frame_to_bytes(frame);
+        self.frames += 1;
+        Ok(())
+    }
+
+    /// The record; `ticks` is what a timer counted during the call.
+    pub fn finish(&mut self, ticks: u32) -> &[u8] {
+        put(&mut self.bytes, 0, &(self.frames as u32).to_le_bytes());
+        put(&mut self.bytes, 4, &ticks.to_le_bytes());
+        self.bytes
+            .get(..REPLY_HEADER + self.frames * FRAME_LEN)
+            .unwrap_or_default()
+    }
+}
+
+/// Number of frames and timer ticks in the header of a reply.
+#[must_use]
+pub fn reply_header(header: [u8; REPLY_HEADER]) -> (u32, u32) {
+    let [a, b, c, d, e, f, g, h] = header;
+    (
+        u32::from_le_bytes([a, b, c, d]),
+        u32::from_le_bytes([e, f, g, h]),
+    )
+}
+
+/// A frame as `struct canfd_frame`.
+#[must_use]
+pub fn frame_to_bytes(frame: &CanFrame) -> [u8; FRAME_LEN] {
+    let (remote, flags) = match frame.kind() {
+        FrameKind::Classical { remote } => (remote, 0),
+        FrameKind::Fd { brs, esi } => (false, FDF | u8::from(brs) * BRS | u8::from(esi) * ESI),
+    };
+    let id =
+        frame.raw_id() | u32::from(frame.is_extended()) * EXTENDED | u32::from(remote) * REMOTE;
+    let len = if remote {
+        usize::from(frame.dlc())
+    } else {
+        frame.data().len()
+    };
+    let mut bytes = [0; FRAME_LEN];
+    put(&mut bytes, 0, &id.to_le_bytes());
+    put(&mut bytes, 4, &[len as u8, flags]);
+    put(&mut bytes, 8, frame.data());
+    bytes
+}
+
+/// The frame in a `struct canfd_frame`, or `None` if no controller could have sent it.
+#[must_use]
+pub fn frame_from_bytes(bytes: &[u8; FRAME_LEN]) -> Option<CanFrame> {
+    let (&[a, b, c, d, len, flags, _, _], data) = bytes.split_first_chunk::<8>()?;
+    let word = u32::from_le_bytes([a, b, c, d]);
+    let raw = word & !(EXTENDED | REMOTE);
+    let id = if word & EXTENDED != 0 {
+        Id::Extended(ExtendedId::new(raw)?)
+    } else {
+        Id::Standard(StandardId::new(u16::try_from(raw).ok()?)?)
+    };
+    let len = usize::from(len);
+    if word & REMOTE != 0 {
+        return CanFrame::remote(id, len);
+    }
+    let data = data.get(..len)?;
+    if flags & FDF == 0 {
+        return CanFrame::classical(id, data);
+    }
+    CanFrame::fd(id, data, flags & BRS != 0).map(|frame| frame.with_esi(flags & ESI != 0))
+}
+
+/// Writes `part` at `at`; what does not fit is left out.
+fn put(bytes: &mut [u8], at: usize, part: &[u8]) {
+    for (place, byte) in bytes.iter_mut().skip(at).zip(part) {
+        *place = *byte;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use firmware::arm::IRB_930;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn any_frame() -> impl Strategy<Value = CanFrame> {
+        let id = prop_oneof![
+            (0..=StandardId::MAX.as_raw())
+                .prop_filter_map("11 bits", StandardId::new)
+                .prop_map(Id::Standard),
+            (0..=ExtendedId::MAX.as_raw())
+                .prop_filter_map("29 bits", ExtendedId::new)
+                .prop_map(Id::Extended),
+        ];
+        let data = proptest::collection::vec(any::<u8>(), 0..=64);
+        (id, data, any::<(bool, bool)>(), 0..3).prop_filter_map(
+            "too long",
+            |(id, data, (brs, esi), kind)| match kind {
+                0 => CanFrame::classical(id, &data[..data.len().min(8)]),
+                1 => CanFrame::remote(id, data.len() % 9),
+                _ => CanFrame::fd(id, &data, brs).map(|frame| frame.with_esi(esi)),
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn every_frame_comes_back(frame in any_frame()) {
+            prop_assert_eq!(frame_from_bytes(&frame_to_bytes(&frame)), Some(frame));
+        }
+
+        #[test]
+        fn every_request_comes_back(now: u64, frame in proptest::option::of(any_frame())) {
+            let request = Request { now, frame };
+            prop_assert_eq!(Request::from_bytes(&request.to_bytes()), Some(request));
+        }
+
+        #[test]
+        fn any_record_is_a_frame_or_none(bytes in proptest::array::uniform32(any::<u8>())) {
+            let mut record = [0; FRAME_LEN];
+            record[..32].copy_from_slice(&bytes);
+            if let Some(frame) = frame_from_bytes(&record) {
+                prop_assert_eq!(frame_from_bytes(&frame_to_bytes(&frame)), Some(frame));
+            }
+        }
+    }
+
+    /// Layout of `struct canfd_frame` in linux/can.h, written out by hand.
+    #[test]
+    fn frames_have_the_layout_of_linux() {
+        let id = ExtendedId::new(0x18FF_1234).unwrap();
+        let bytes = frame_to_bytes(&CanFrame::fd(id, &[1, 2, 3], true).unwrap());
+        assert_eq!(
+            bytes[..12],
+            [0x34, 0x12, 0xFF, 0x98, 3, 5, 0, 0, 1, 2, 3, 0]
+        );
+    }
+
+    #[test]
+    fn the_configuration_comes_back_to_the_bit() {
+        let mut config = Config::new(IRB_930, 1e-3);
+        config.command_delay = 2.345e-4;
+        config.arm.geometry.a2 = f32::from_bits(0x3EFA_E148);
+        assert_eq!(
+            config_from_bytes(&config_to_bytes(&config).unwrap()),
+            Some(config)
+        );
+    }
+
+    #[test]
+    fn a_full_reply_refuses_one_more() {
+        let frame = CanFrame::classical(StandardId::ZERO, &[7]).unwrap();
+        let mut reply = Reply::new();
+        for _ in 0..REPLY_FRAMES {
+            reply.push(&frame).unwrap();
+        }
+        assert_eq!(reply.push(&frame), Err(TransmitError::QueueFull));
+        let bytes = reply.finish(9);
+        assert_eq!(bytes.len(), REPLY_HEADER + REPLY_FRAMES * FRAME_LEN);
+        assert_eq!(
+            reply_header(*bytes.first_chunk().unwrap()),
+            (REPLY_FRAMES as u32, 9)
+        );
+    }
+}
