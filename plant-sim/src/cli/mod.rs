@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand.
 
 mod dbc;
+mod eval;
 mod run;
 mod trace;
 
@@ -24,6 +25,8 @@ struct Cli {
 enum Command {
     /// Run a scenario (the default command).
     Run(run::RunArgs),
+    /// Compute kinematics or dynamics for the rows of a CSV table on standard input.
+    Eval(eval::EvalArgs),
     /// Look into a recorded trace.
     #[command(subcommand)]
     Trace(trace::TraceCommand),
@@ -37,6 +40,7 @@ pub fn main() -> Result<ExitCode, String> {
     match cli.command {
         None => run::run(&cli.run),
         Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Eval(args)) => eval::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),
         Some(Command::Dbc(args)) => dbc::run(&args),
     }
