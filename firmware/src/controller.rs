@@ -64,7 +64,7 @@ impl Config {
             },
             period,
             command_delay: 0.25e-3,
-            brake_delay: 0.03,
+            brake_delay: 0.06,
             monitor: MonitorLimits::DEFAULT,
         }
     }
@@ -205,6 +205,11 @@ impl Controller {
     pub fn queued(&self) -> u8 {
         let planning = usize::from(!self.planner.is_idle());
         u8::try_from(self.moves.len() + self.requests.len() + planning).unwrap_or(u8::MAX)
+    }
+
+    /// Whether a move is being planned: what makes a sample expensive.
+    pub fn is_planning(&self) -> bool {
+        !self.planner.is_idle()
     }
 
     /// Number of the last move that was completed.
