@@ -7,6 +7,8 @@ use firmware::node::Node;
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
 
+use crate::rig::COMPUTE_NS;
+
 /// A controller somewhere, in lock-step with the rig.
 pub trait Endpoint {
     /// Lets the controller look at `received` at time `now` (µs) and appends what it sends.
@@ -23,6 +25,31 @@ pub trait Endpoint {
 
     /// The controller itself, or the twin that is fed the same frames: what it had in mind.
     fn node(&self) -> &Node;
+
+    /// Time from the frame handed over last until its answer left the controller, ns.
+    fn latency_ns(&self) -> u64 {
+        COMPUTE_NS
+    }
+}
+
+/// A controller that outlives its rig, to be asked about the run afterwards.
+impl<E: Endpoint> Endpoint for &mut E {
+    fn poll(
+        &mut self,
+        now: u64,
+        received: Option<&CanFrame>,
+        sent: &mut Vec<CanFrame>,
+    ) -> Result<(), EndpointError> {
+        (**self).poll(now, received, sent)
+    }
+
+    fn node(&self) -> &Node {
+        (**self).node()
+    }
+
+    fn latency_ns(&self) -> u64 {
+        (**self).latency_ns()
+    }
 }
 
 /// Why a controller is of no use any more.

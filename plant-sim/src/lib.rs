@@ -8,6 +8,7 @@ pub mod dbc;
 pub mod drives;
 pub mod endpoint;
 pub mod eval;
+pub mod external;
 pub mod metrics;
 pub mod model;
 pub mod operator;

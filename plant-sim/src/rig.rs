@@ -305,8 +305,11 @@ impl<E: Endpoint> Rig<E> {
         received: Option<&CanFrame>,
     ) -> Result<(), EndpointError> {
         self.controller.poll(now / 1000, received, &mut self.sent)?;
+        // What is sent later does not overtake.
+        let last = self.computed.back().map_or(0, |(time, _)| *time);
+        let time = last.max(now + self.controller.latency_ns());
         for frame in self.sent.drain(..) {
-            self.computed.push_back((now + COMPUTE_NS, frame));
+            self.computed.push_back((time, frame));
         }
         Ok(())
     }

@@ -1,0 +1,96 @@
+//! Who else is on the bus: no other plant, and one controller.
+
+use std::time::{Duration, Instant};
+
+use protocol::bus::Bus;
+use protocol::codec;
+use protocol::frame::{CanFrame, Id};
+use protocol::link::{Link, LinkAddress};
+use protocol::messages::{Message, Nmt, NmtCommand, Node as Name};
+use protocol::schema::MessageInfo;
+
+use super::Remote;
+use crate::endpoint::EndpointError;
+
+/// How long a bus is listened to before taking part: longer than the pause between two signs of a waiting plant.
+const LISTEN: Duration = Duration::from_millis(300);
+/// Between two requests to start afresh while no controller answers.
+const RETRY: Duration = Duration::from_millis(200);
+/// Longest wait for a controller.
+const MEET_LIMIT: Duration = Duration::from_secs(60);
+
+/// Node that sends this frame, if only one may.
+pub fn sender(frame: &CanFrame) -> Option<Name> {
+    match frame.id() {
+        Id::Standard(id) => MessageInfo::of(id.as_raw()).and_then(|info| info.sender),
+        Id::Extended(_) => None,
+    }
+}
+
+/// Opens the bus, makes sure that no other plant is on it, and waits until a controller is, which starts afresh.
+pub fn meet(address: &LinkAddress) -> Result<Remote, EndpointError> {
+    let bus = address.to_string();
+    let link = Link::open(address).map_err(|error| EndpointError {
+        who: format!("on {bus}"),
+        what: format!("is out of reach: {error}"),
+    })?;
+    let mut remote = Remote { link, bus };
+    hear(&mut remote, LISTEN, false)?;
+    let began = Instant::now();
+    let mut told = false;
+    loop {
+        // A controller that is already there hears this before the first sample; one that starts later needs it not.
+        remote.send(&reset())?;
+        if hear(&mut remote, RETRY, true)? {
+            if told {
+                eprintln!("plant-sim: the controller is there");
+            }
+            return Ok(remote);
+        }
+        if began.elapsed() > MEET_LIMIT {
+            return Err(remote.error(format!("did not appear within {} s", MEET_LIMIT.as_secs())));
+        }
+        if !told {
+            told = true;
+            eprintln!(
+                "plant-sim: waiting for a controller; start it with: controller --bus {}",
+                remote.bus
+            );
+        }
+    }
+}
+
+/// Listens until the time is over or, if asked for, a controller speaks: `true` then.
+fn hear(remote: &mut Remote, time: Duration, controller: bool) -> Result<bool, EndpointError> {
+    let end = Instant::now() + time;
+    loop {
+        while let Some(frame) = remote.link.receive() {
+            match sender(&frame) {
+                Some(Name::Drives | Name::Operator) => {
+                    return Err(EndpointError {
+                        who: format!("on {}", remote.bus),
+                        what: format!(
+                            "belongs to another plant, which sends {frame}; stop one of the two"
+                        ),
+                    });
+                }
+                Some(Name::Controller) if controller => return Ok(true),
+                _ => {}
+            }
+        }
+        let left = end.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(false);
+        }
+        remote.wait(left)?;
+    }
+}
+
+/// "Start afresh", to the controller.
+fn reset() -> CanFrame {
+    let reset = Nmt {
+        command: NmtCommand::ResetNode,
+        node: Name::Controller.code(),
+    };
+    codec::encode(&Message::Nmt(reset), 0).expect("two bytes without floats")
+}
