@@ -1,22 +1,47 @@
 //! `plant-sim trace`: looks into recorded traces.
+//!
+//! Every subcommand reads its trace once, from front to end, in bounded memory.
 
-use std::cell::Cell;
+mod source;
+
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::rc::Rc;
-use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand, ValueEnum};
+use firmware::arm::ArmModel;
+use plant_sim::bus::BitTiming;
+use plant_sim::model::RobotModel;
+use plant_sim::rig::RigConfig;
+use plant_sim::scenario;
+use plant_sim::trace::Record;
+use plant_sim::trace::check::Checker;
+use plant_sim::trace::convert::{Converter, Target};
 use plant_sim::trace::decode::{Decoder, Format};
-use plant_sim::trace::{Problem, ReadError, Reader, Record};
+use plant_sim::trace::plot::Plot;
+use plant_sim::trace::replay::Replay;
+use plant_sim::trace::stats::Gatherer;
+
+use super::run::load;
+use super::show;
+use source::Source;
 
 /// Subcommands of `trace`.
 #[derive(Subcommand)]
 pub enum TraceCommand {
     /// Name every field of every frame, with its unit.
     Decode(DecodeArgs),
+    /// Rates, periods, jitter, losses and bus load, by identifier.
+    Stats(StatsArgs),
+    /// Draw positions, errors, torques, modes and faults over time (SVG).
+    Plot(PlotArgs),
+    /// Judge the trace by the rules of the protocol; name the first offence.
+    Check(CheckArgs),
+    /// Feed the trace into a fresh controller and compare its commands byte for byte.
+    Replay(ReplayArgs),
+    /// Write the trace in the format of another tool.
+    Convert(ConvertArgs),
 }
 
 /// Arguments of `decode`.
@@ -27,6 +52,9 @@ pub struct DecodeArgs {
     /// How it is written.
     #[arg(long, value_name = "FORMAT", default_value = "text")]
     format: FormatChoice,
+    /// Write to this file instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -39,10 +67,84 @@ enum FormatChoice {
     Jsonl,
 }
 
+/// Arguments of `stats`.
+#[derive(Args)]
+pub struct StatsArgs {
+    /// candump log, or - for standard input.
+    file: PathBuf,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `plot`.
+#[derive(Args)]
+pub struct PlotArgs {
+    /// candump log, or - for standard input.
+    file: PathBuf,
+    /// The robot (a model file); turns encoder counts into joint positions.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Write to this file instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Arguments of `check`.
+#[derive(Args)]
+pub struct CheckArgs {
+    /// candump log, or - for standard input.
+    file: PathBuf,
+    /// The robot (a model file); its motors limit the torque.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+}
+
+/// Arguments of `replay`.
+#[derive(Args)]
+pub struct ReplayArgs {
+    /// candump log that begins before the controller's first sample, or - for standard input.
+    file: PathBuf,
+    /// The robot that the recorded controller believed in (a model file).
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Control rate of the recorded controller.
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    rate: f64,
+}
+
+/// Arguments of `convert`.
+#[derive(Args)]
+pub struct ConvertArgs {
+    /// candump log, or - for standard input.
+    file: PathBuf,
+    /// What it becomes.
+    #[arg(long, value_name = "FORMAT")]
+    to: TargetChoice,
+    /// Write to this file instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum TargetChoice {
+    /// For Wireshark and tshark.
+    Pcapng,
+    /// For CANalyzer and CANoe.
+    Asc,
+    /// For can-utils and python-can.
+    Candump,
+}
+
 /// Does what the subcommand says.
 pub fn run(command: &TraceCommand) -> Result<ExitCode, String> {
     match command {
         TraceCommand::Decode(args) => decode(args),
+        TraceCommand::Stats(args) => stats(args),
+        TraceCommand::Plot(args) => plot(args),
+        TraceCommand::Check(args) => check(args),
+        TraceCommand::Replay(args) => replay(args),
+        TraceCommand::Convert(args) => convert(args),
     }
 }
 
@@ -53,146 +155,152 @@ fn decode(args: &DecodeArgs) -> Result<ExitCode, String> {
         FormatChoice::Jsonl => Format::JsonLines,
     };
     let mut source = Source::open(&args.file)?;
-    let mut decoder = or_gone(Decoder::new(stdout(), format))?;
-    while let Some(record) = source.record()?
-        && let Some(open) = &mut decoder
-    {
-        if or_gone(open.record(&record))?.is_none() {
-            decoder = None;
-        }
+    let out = args.out.as_deref();
+    written(out, || {
+        let mut decoder = Decoder::new(sink(out)?, format)?;
+        each(&mut source, |record| decoder.record(record))?;
+        decoder.finish()?;
+        Ok(())
+    })?;
+    source.verdict()
+}
+
+fn convert(args: &ConvertArgs) -> Result<ExitCode, String> {
+    let target = match args.to {
+        TargetChoice::Pcapng => Target::Pcapng,
+        TargetChoice::Asc => Target::Asc,
+        TargetChoice::Candump => Target::Candump,
+    };
+    let mut source = Source::open(&args.file)?;
+    let out = args.out.as_deref();
+    written(out, || {
+        let mut converter = Converter::new(sink(out)?, target)?;
+        each(&mut source, |record| converter.record(record))?;
+        converter.finish()?;
+        Ok(())
+    })?;
+    source.verdict()
+}
+
+fn stats(args: &StatsArgs) -> Result<ExitCode, String> {
+    let mut source = Source::open(&args.file)?;
+    let mut gatherer = Gatherer::new(BitTiming::default());
+    while let Some(record) = source.record()? {
+        gatherer.record(&record);
     }
-    if let Some(decoder) = decoder {
-        or_gone(decoder.finish())?;
+    let statistics = gatherer.statistics();
+    if args.json {
+        let json = serde_json::to_string_pretty(&statistics).map_err(|error| error.to_string())?;
+        show(&(json + "\n"))?;
+    } else {
+        show(&statistics.to_string())?;
     }
     source.verdict()
 }
 
-fn stdout() -> impl Write {
-    BufWriter::with_capacity(1 << 16, io::stdout().lock())
+fn plot(args: &PlotArgs) -> Result<ExitCode, String> {
+    let arm = ArmModel::from(&load(args.model.as_ref())?);
+    let mut source = Source::open(&args.file)?;
+    let mut plot = Plot::new(&arm, &args.file.display().to_string());
+    while let Some(record) = source.record()? {
+        plot.record(&record);
+    }
+    let out = args.out.as_deref();
+    written(out, || {
+        let mut sink = sink(out)?;
+        sink.write_all(plot.svg().as_bytes())?;
+        sink.flush()?;
+        Ok(())
+    })?;
+    source.verdict()
 }
 
-/// The result, or `None` when the reader of standard output has seen enough and gone (`| head`).
-fn or_gone<T>(result: io::Result<T>) -> Result<Option<T>, String> {
-    match result {
-        Ok(value) => Ok(Some(value)),
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(None),
-        Err(error) => Err(format!("cannot write to standard output: {error}")),
+fn check(args: &CheckArgs) -> Result<ExitCode, String> {
+    let arm = ArmModel::from(&load(args.model.as_ref())?);
+    let mut source = Source::open(&args.file)?;
+    let mut checker = Checker::new(&arm);
+    while let Some(line) = source.line()? {
+        let record = line.map_err(|problem| format!("{}: {problem}", source.place()))?;
+        checker
+            .record(&record)
+            .map_err(|offence| format!("{}: {offence}", source.place()))?;
+    }
+    let counts = checker.counts();
+    show(&format!(
+        "{} frames keep every rule; {} foreign frames and {} error frames are not judged\n",
+        counts.judged, counts.foreign, counts.error_frames
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
+    scenario::check_rate(args.rate)
+        .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
+    let model: RobotModel = load(args.model.as_ref())?;
+    let config = RigConfig {
+        believed: ArmModel::from(&model),
+        plant: model,
+        rate_hz: args.rate,
+        start: [0.0; 4],
+        timing: BitTiming::default(),
+    };
+    let mut source = Source::open(&args.file)?;
+    let mut replay = Replay::new(config.controller());
+    while let Some(record) = source.record()? {
+        replay
+            .record(&record)
+            .map_err(|difference| format!("{}: {difference}", source.place()))?;
+    }
+    show(&format!(
+        "{} commands are the same, byte for byte\n",
+        replay.compared()
+    ))?;
+    source.verdict()
+}
+
+/// Which end failed.
+enum Failure {
+    Input(String),
+    Output(io::Error),
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::Output(error)
     }
 }
 
-/// Unreadable lines that are shown; of more, only the number is.
-const SHOWN: u64 = 10;
-/// Records between two looks at the clock.
-const LOOK: u64 = 1 << 14;
-
-/// A trace that is read from front to end, with its progress on standard error.
-struct Source {
-    name: String,
-    reader: Reader<BufReader<Counted>>,
-    /// Bytes read, and bytes there are if that is known.
-    bytes: Rc<Cell<u64>>,
-    size: Option<u64>,
-    records: u64,
-    unreadable: u64,
-    shown: Instant,
-}
-
-/// An input that counts what is read from it.
-struct Counted {
-    input: Box<dyn Read>,
-    bytes: Rc<Cell<u64>>,
-}
-
-impl Read for Counted {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = self.input.read(buffer)?;
-        self.bytes.set(self.bytes.get() + read as u64);
-        Ok(read)
+/// Hands every record to `take`.
+fn each(
+    source: &mut Source,
+    mut take: impl FnMut(&Record) -> io::Result<()>,
+) -> Result<(), Failure> {
+    while let Some(record) = source.record().map_err(Failure::Input)? {
+        take(&record)?;
     }
+    Ok(())
 }
 
-impl Source {
-    fn open(path: &Path) -> Result<Self, String> {
-        let name = path.display().to_string();
-        let (input, size): (Box<dyn Read>, _) = if path == Path::new("-") {
-            (Box::new(io::stdin()), None)
-        } else {
-            let file = File::open(path).map_err(|error| format!("cannot read {name}: {error}"))?;
-            let size = file.metadata().map(|data| data.len()).ok();
-            (Box::new(file), size.filter(|&size| size > 0))
-        };
-        let bytes = Rc::new(Cell::new(0));
-        let input = Counted {
-            input,
-            bytes: Rc::clone(&bytes),
-        };
-        Ok(Self {
-            name,
-            reader: Reader::new(BufReader::with_capacity(1 << 16, input)),
-            bytes,
-            size,
-            records: 0,
-            unreadable: 0,
-            shown: Instant::now(),
-        })
-    }
+/// The file, or standard output.
+fn sink(out: Option<&Path>) -> io::Result<BufWriter<Box<dyn Write>>> {
+    let sink: Box<dyn Write> = match out {
+        Some(path) => Box::new(File::create(path)?),
+        None => Box::new(io::stdout().lock()),
+    };
+    Ok(BufWriter::with_capacity(1 << 16, sink))
+}
 
-    /// The next line as it is; `Err` if the file cannot be read.
-    fn line(&mut self) -> Result<Option<Result<Record, Problem>>, String> {
-        self.progress();
-        match self.reader.next() {
-            None => Ok(None),
-            Some(Ok(record)) => {
-                self.records += 1;
-                Ok(Some(Ok(record)))
-            }
-            Some(Err(ReadError::Line { problem, .. })) => Ok(Some(Err(problem))),
-            Some(Err(error @ ReadError::Io { .. })) => Err(format!("{}: {error}", self.name)),
+/// Does the writing. A reader of standard output that has seen enough and gone (`| head`) is no error.
+fn written(out: Option<&Path>, write: impl FnOnce() -> Result<(), Failure>) -> Result<(), String> {
+    match (write(), out) {
+        (Ok(()), _) => Ok(()),
+        (Err(Failure::Input(message)), _) => Err(message),
+        (Err(Failure::Output(error)), None) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        (Err(Failure::Output(error)), None) => {
+            Err(format!("cannot write to standard output: {error}"))
         }
-    }
-
-    /// The next record; lines that cannot be read are named on standard error and left out.
-    fn record(&mut self) -> Result<Option<Record>, String> {
-        loop {
-            match self.line()? {
-                None => return Ok(None),
-                Some(Ok(record)) => return Ok(Some(record)),
-                Some(Err(problem)) => {
-                    self.unreadable += 1;
-                    if self.unreadable <= SHOWN {
-                        eprintln!("plant-sim: {}: {problem}", self.place());
-                    }
-                }
-            }
+        (Err(Failure::Output(error)), Some(path)) => {
+            Err(format!("cannot write {}: {error}", path.display()))
         }
-    }
-
-    /// File and line read last.
-    fn place(&self) -> String {
-        format!("{}:{}", self.name, self.reader.line())
-    }
-
-    /// Success only if every line could be read.
-    fn verdict(&self) -> Result<ExitCode, String> {
-        match self.unreadable {
-            0 => Ok(ExitCode::SUCCESS),
-            lines => Err(format!(
-                "{}: {lines} of {} lines could not be read",
-                self.name,
-                self.reader.line() - 1
-            )),
-        }
-    }
-
-    fn progress(&mut self) {
-        if !self.reader.line().is_multiple_of(LOOK) || self.shown.elapsed() < Duration::from_secs(2)
-        {
-            return;
-        }
-        self.shown = Instant::now();
-        let share = self.size.map_or(String::new(), |size| {
-            format!(" ({:.0} %)", self.bytes.get() as f64 / size as f64 * 100.0)
-        });
-        eprintln!("{}: {} frames{share}", self.name, self.records);
     }
 }

@@ -116,8 +116,7 @@ impl<W: Write> Decoder<W> {
                     "{start},{},",
                     full_name(field.signal.name, element)
                 )?;
-                write_value(&mut self.sink, value)?;
-                writeln!(self.sink, ",{unit}")?;
+                writeln!(self.sink, "{value},{unit}")?;
             }
         }
         Ok(())
@@ -244,7 +243,7 @@ fn text_field(sink: &mut impl Write, field: Field) -> io::Result<()> {
         if index > 0 {
             sink.write_all(b", ")?;
         }
-        write_value(sink, value)?;
+        write!(sink, "{value}")?;
         if common.is_none() {
             write!(sink, " {unit}")?;
         }
@@ -255,25 +254,6 @@ fn text_field(sink: &mut impl Write, field: Field) -> io::Result<()> {
     match common {
         Some((_, unit)) if !unit.is_empty() => write!(sink, " {unit}"),
         _ => Ok(()),
-    }
-}
-
-fn write_value(sink: &mut impl Write, value: Value) -> io::Result<()> {
-    match value {
-        Value::Unsigned(value) => write!(sink, "{value}"),
-        Value::Signed(value) => write!(sink, "{value}"),
-        Value::Float(value) => write!(sink, "{value}"),
-        Value::Code(name) => sink.write_all(name.as_bytes()),
-        Value::Flags(..) => {
-            let mut names = value.flags();
-            match names.next() {
-                None => sink.write_all(b"-"),
-                Some(first) => {
-                    sink.write_all(first.as_bytes())?;
-                    names.try_for_each(|name| write!(sink, "|{name}"))
-                }
-            }
-        }
     }
 }
 
@@ -300,7 +280,7 @@ fn json_element(
             write!(sink, "[{}]", names.join(","))?;
         }
         // Digits enough to tell this float from every other.
-        Value::Unsigned(_) | Value::Signed(_) | Value::Float(_) => write_value(sink, value)?,
+        Value::Unsigned(_) | Value::Signed(_) | Value::Float(_) => write!(sink, "{value}")?,
     }
     if !unit.is_empty() {
         write!(sink, r#","unit":"{unit}""#)?;

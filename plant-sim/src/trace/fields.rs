@@ -1,7 +1,8 @@
 //! Frames taken apart by the message table: every field with its name, its unit and its value.
 
+use std::fmt;
+
 use protocol::codec::{self, DecodeError};
-use protocol::e2e::Profile;
 use protocol::frame::{CanFrame, FD_MAX};
 use protocol::schema::{Kind, MessageInfo, Signal};
 
@@ -124,6 +125,23 @@ impl Value {
     }
 }
 
+/// Numbers with as many digits as tell them from their neighbours; flags as `ready|torque-on`, none as `-`.
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unsigned(value) => value.fmt(f),
+            Self::Signed(value) => value.fmt(f),
+            Self::Float(value) => value.fmt(f),
+            Self::Code(name) => f.write_str(name),
+            Self::Flags(..) => {
+                let mut names = self.flags();
+                f.write_str(names.next().unwrap_or("-"))?;
+                names.try_for_each(|name| write!(f, "|{name}"))
+            }
+        }
+    }
+}
+
 /// Name of an element among all elements of its message, as the DBC has it too: `position_elbow`.
 #[must_use]
 pub fn full_name(signal: &str, element: &str) -> String {
@@ -131,22 +149,5 @@ pub fn full_name(signal: &str, element: &str) -> String {
         signal.to_owned()
     } else {
         format!("{signal}_{element}")
-    }
-}
-
-/// End-to-end counter and CRC of a frame of this message, whether or not they are right; `None` for a message
-/// without, or a frame of another length.
-#[must_use]
-pub fn protection(info: &MessageInfo, frame: &CanFrame) -> Option<(u8, u16)> {
-    let data = frame.data();
-    if data.len() != info.len {
-        return None;
-    }
-    match (info.protection?, data) {
-        (Profile::Classical, [.., counter, crc]) => Some((*counter, u16::from(*crc))),
-        (Profile::Fd, [.., counter, high, low]) => {
-            Some((*counter, u16::from_be_bytes([*high, *low])))
-        }
-        _ => None,
     }
 }

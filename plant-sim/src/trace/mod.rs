@@ -10,10 +10,15 @@
 //! Three identifier digits are an 11-bit identifier, eight a 29-bit one or, with 0x20000000, an error frame as SocketCAN
 //! reports it. `##` introduces an FD frame, its first digit holds the flags.
 
+pub mod check;
+pub mod convert;
 pub mod decode;
 pub mod fields;
 mod line;
+pub mod plot;
 mod reader;
+pub mod replay;
+pub mod stats;
 mod writer;
 
 use std::fmt;

@@ -6,7 +6,8 @@ use protocol::frame::{CanFrame, FrameKind, Id};
 use sha2::{Digest, Sha256};
 
 use super::{
-    ERROR_FLAG, ErrorFrame, FLAG_BRS, FLAG_ESI, Interface, LogHash, line::MAX_LINE as CAPACITY,
+    ERROR_FLAG, Entry, ErrorFrame, FLAG_BRS, FLAG_ESI, Interface, LogHash, Record,
+    line::MAX_LINE as CAPACITY,
 };
 
 /// Writes a log of one interface, line by line, and hashes it on the way.
@@ -34,29 +35,11 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// Those of the sink. The hash covers whole lines only.
     pub fn frame(&mut self, time_us: u64, frame: &CanFrame) -> io::Result<()> {
-        let mut line = Line::new(time_us, &self.interface);
-        match frame.id() {
-            Id::Standard(id) => line.hex(id.as_raw().into(), 3),
-            Id::Extended(id) => line.hex(id.as_raw(), 8),
-        }
-        line.byte(b'#');
-        match frame.kind() {
-            FrameKind::Classical { remote: false } => {}
-            FrameKind::Classical { remote: true } => {
-                line.byte(b'R');
-                // A length of zero is left out, as can-utils does.
-                if frame.dlc() > 0 {
-                    line.byte(b'0' + frame.dlc());
-                }
-            }
-            FrameKind::Fd { brs, esi } => {
-                line.byte(b'#');
-                let flags = (u8::from(brs) * FLAG_BRS) | (u8::from(esi) * FLAG_ESI);
-                line.hex(flags.into(), 1);
-            }
-        }
-        line.data(frame.data());
-        self.append(line)
+        self.record(&Record {
+            time_us,
+            interface: self.interface,
+            entry: Entry::Frame(*frame),
+        })
     }
 
     /// Appends what a controller reported at `time_us`.
@@ -64,11 +47,31 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// Those of the sink.
     pub fn error(&mut self, time_us: u64, error: &ErrorFrame) -> io::Result<()> {
-        let mut line = Line::new(time_us, &self.interface);
-        line.hex(error.class & (ERROR_FLAG - 1) | ERROR_FLAG, 8);
-        line.byte(b'#');
-        line.data(&error.data);
-        self.append(line)
+        self.record(&Record {
+            time_us,
+            interface: self.interface,
+            entry: Entry::Error(*error),
+        })
+    }
+
+    /// Appends a record of any interface.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn record(&mut self, record: &Record) -> io::Result<()> {
+        let mut line = Line::new(record.time_us, &record.interface);
+        match &record.entry {
+            Entry::Frame(frame) => line.frame(frame),
+            Entry::Error(error) => {
+                line.hex(error.class & (ERROR_FLAG - 1) | ERROR_FLAG, 8);
+                line.byte(b'#');
+                line.data(&error.data);
+            }
+        }
+        line.byte(b'\n');
+        self.sink.write_all(line.bytes())?;
+        self.hash.update(line.bytes());
+        Ok(())
     }
 
     /// Flushes the sink and gives it back with the hash of all that was written.
@@ -78,13 +81,6 @@ impl<W: Write> Writer<W> {
     pub fn finish(mut self) -> io::Result<(W, LogHash)> {
         self.sink.flush()?;
         Ok((self.sink, LogHash(self.hash.finalize().into())))
-    }
-
-    fn append(&mut self, mut line: Line) -> io::Result<()> {
-        line.byte(b'\n');
-        self.sink.write_all(line.bytes())?;
-        self.hash.update(line.bytes());
-        Ok(())
     }
 }
 
@@ -108,6 +104,30 @@ impl Line {
         line.extend(interface.as_bytes());
         line.byte(b' ');
         line
+    }
+
+    fn frame(&mut self, frame: &CanFrame) {
+        match frame.id() {
+            Id::Standard(id) => self.hex(id.as_raw().into(), 3),
+            Id::Extended(id) => self.hex(id.as_raw(), 8),
+        }
+        self.byte(b'#');
+        match frame.kind() {
+            FrameKind::Classical { remote: false } => {}
+            FrameKind::Classical { remote: true } => {
+                self.byte(b'R');
+                // A length of zero is left out, as can-utils does.
+                if frame.dlc() > 0 {
+                    self.byte(b'0' + frame.dlc());
+                }
+            }
+            FrameKind::Fd { brs, esi } => {
+                self.byte(b'#');
+                let flags = (u8::from(brs) * FLAG_BRS) | (u8::from(esi) * FLAG_ESI);
+                self.hex(flags.into(), 1);
+            }
+        }
+        self.data(frame.data());
     }
 
     fn bytes(&self) -> &[u8] {
