@@ -136,6 +136,8 @@ pub struct Controller {
 impl Controller {
     /// A controller in self-test. The model should have passed [`ArmModel::validate`]; one that
     /// has not never leaves self-test.
+    // Out of line it is built in place; inlined it would take its own size once more on the stack.
+    #[inline(never)]
     pub fn new(config: Config) -> Self {
         Self {
             body: Body::new(&config.arm, &config.payload),

@@ -89,6 +89,8 @@ pub struct Node {
 
 impl Node {
     /// A node in self-test.
+    // Out of line it is built in place; inlined it would take its own size once more on the stack.
+    #[inline(never)]
     pub fn new(config: Config) -> Self {
         Self {
             controller: Controller::new(config),

@@ -3,12 +3,16 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
+use plant_sim::external::{LockStep, RealTime};
 use plant_sim::model::RobotModel;
+use plant_sim::qemu::{self, Qemu};
 use plant_sim::run::{self, RunConfig, Summary};
 use plant_sim::scenario::{self, Scenario};
 use plant_sim::selection::LawChoice;
+use protocol::link::{AddressError, LinkAddress};
 
 use super::show;
 
@@ -31,9 +35,22 @@ pub struct RunArgs {
     /// Control rate.
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
-    /// The bus: builtin is the bit-timed simulated one.
+    /// The bus: builtin is the bit-timed simulated one; socketcan:INTERFACE, slcan:TERMINAL or
+    /// slcan:tcp:HOST:PORT lead to an external controller.
     #[arg(long, value_name = "BUS", default_value = "builtin")]
     bus: BusChoice,
+    /// Take samples at deadlines of the clock instead of waiting for each command (needs an
+    /// external controller that was started with --real-time).
+    #[arg(long)]
+    real_time: bool,
+    /// Where the controller runs: in this process, as an image on an emulated Cortex-M4F, or
+    /// external, on the other end of --bus. The last two are held against the one in this process
+    /// byte for byte.
+    #[arg(long, value_name = "WHERE", default_value = "in-process")]
+    controller: ControllerChoice,
+    /// The image for --controller qemu, instead of the one built from the sources.
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -53,13 +70,34 @@ pub struct RunArgs {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum ControllerChoice {
+    InProcess,
+    Qemu,
+    External,
+}
+
+#[derive(Clone)]
 enum BusChoice {
     Builtin,
+    Link(LinkAddress),
+}
+
+impl FromStr for BusChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "builtin" {
+            return Ok(Self::Builtin);
+        }
+        text.parse()
+            .map(Self::Link)
+            .map_err(|error: AddressError| format!("{error}, or builtin"))
+    }
 }
 
 /// Runs the scenario, writes the results and shows the summary.
 pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
-    let BusChoice::Builtin = args.bus;
+    let place = place(args)?;
     let mut scenario = Scenario::open(&args.scenario).map_err(|error| error.to_string())?;
     if let Some(law) = args.law {
         scenario.law = law;
@@ -92,7 +130,33 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         plant_model,
         seed: args.seed,
     };
-    let summary = run::execute(&config, Some(&args.out)).map_err(|error| error.to_string())?;
+    let summary = match place {
+        Place::InProcess => run::execute(&config, Some(&args.out)),
+        Place::Qemu => {
+            let options = qemu::Options {
+                image: args.image.clone(),
+                count: None,
+            };
+            run::execute_with(&config, Some(&args.out), |config| {
+                Qemu::start(config, &options)
+            })
+        }
+        Place::LockStep(bus) => run::execute_with(&config, Some(&args.out), |config| {
+            LockStep::connect(bus, config)
+        }),
+        Place::RealTime(bus) => {
+            let mut controller = None;
+            let summary = run::execute_with(&config, Some(&args.out), |config| {
+                Ok(controller.insert(RealTime::connect(bus, config)?))
+            });
+            if let Some(controller) = &controller {
+                eprint!("{}", controller.timing().report());
+                eprintln!("  commands unlike the twin's {}", controller.different());
+            }
+            summary
+        }
+    }
+    .map_err(|error| error.to_string())?;
     if args.json {
         let json = serde_json::to_string_pretty(&summary).map_err(|error| error.to_string())?;
         show(&(json + "\n"))?;
@@ -102,6 +166,37 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     match &summary.error {
         None => Ok(ExitCode::SUCCESS),
         Some(error) => Err(format!("the run was not completed: {error}")),
+    }
+}
+
+/// Where the controller is, with what that needs.
+enum Place<'a> {
+    InProcess,
+    Qemu,
+    LockStep(&'a LinkAddress),
+    RealTime(&'a LinkAddress),
+}
+
+/// Puts together what belongs together: a link and an external controller need each other, and an
+/// external controller brings its own model of the robot.
+fn place(args: &RunArgs) -> Result<Place<'_>, String> {
+    match (args.controller, &args.bus) {
+        (ControllerChoice::External, BusChoice::Link(_)) if args.model.is_some() => Err(
+            "--model is what the controller believes, and an external one has its own; use --plant-model".into(),
+        ),
+        (ControllerChoice::External, BusChoice::Link(bus)) if args.real_time => {
+            Ok(Place::RealTime(bus))
+        }
+        (ControllerChoice::External, BusChoice::Link(bus)) => Ok(Place::LockStep(bus)),
+        (ControllerChoice::External, BusChoice::Builtin) => Err(
+            "--controller external needs a bus that leads to it, such as --bus socketcan:vcan0".into(),
+        ),
+        (_, BusChoice::Link(bus)) => Err(format!(
+            "--bus {bus} leads to an external controller: add --controller external, and start it with: controller --bus {bus}"
+        )),
+        _ if args.real_time => Err("--real-time needs --controller external".into()),
+        (ControllerChoice::InProcess, BusChoice::Builtin) => Ok(Place::InProcess),
+        (ControllerChoice::Qemu, BusChoice::Builtin) => Ok(Place::Qemu),
     }
 }
 

@@ -8,9 +8,10 @@ use core::panic::PanicInfo;
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
+use firmware::controller::Config;
 use firmware::node::Node;
 use mps2_an386::{
-    CONFIG_LEN, FROM_BOARD, REQUEST_LEN, Reply, Request, STACK_REPORT, TO_BOARD, config_from_bytes,
+    CONFIG_LEN, FROM_BOARD, REQUEST_LEN, Reply, Request, TO_BOARD, config_from_bytes,
 };
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
@@ -23,60 +24,70 @@ const SYST_MAX: u32 = 0x00FF_FFFF;
 #[entry]
 fn main() -> ! {
     // Static, so that the stack holds calls only. The attribute hands these out once, as references.
+    static mut CONFIG: Option<Config> = None;
     static mut NODE: Option<Node> = None;
     static mut REPLY: Reply = Reply::new();
-    host::exit(serve(NODE, REPLY))
+    host::exit(start(CONFIG, NODE, REPLY))
 }
 
-/// Answers until the host goes away.
-fn serve(slot: &mut Option<Node>, reply: &mut Reply) -> Result<(), End> {
+fn start(
+    config: &mut Option<Config>,
+    node: &mut Option<Node>,
+    reply: &mut Reply,
+) -> Result<(), End> {
     if let Some(mut core) = cortex_m::Peripherals::take() {
-        start(&mut core.SYST);
+        start_timer(&mut core.SYST);
     }
     let input = File::open(TO_BOARD)?;
     let output = File::create(FROM_BOARD)?;
-    let node = configure(&input, slot)?;
-    let mut record = [0; REQUEST_LEN];
-    while input.read(&mut record).is_ok() {
-        let request = Request::from_bytes(&record).ok_or(End)?;
-        reply.clear();
-        let mut port = Port {
-            received: request.frame,
-            reply,
-        };
-        let before = SYST::get_current();
-        node.poll(request.now, &mut port);
-        let ticks = before.wrapping_sub(SYST::get_current()) & SYST_MAX;
-        output.write(reply.finish(ticks))?;
-    }
-    File::create(STACK_REPORT)?.write(&decimal(stack::used()))
+    let config = receive(&input, config)?;
+    let node = build(config, node);
+    serve(&input, &output, node, reply)
 }
 
-/// Out of line, so that the record is off the stack when the node runs.
+// Three steps out of line: each begins with the stack that the one before has given back.
+
 #[inline(never)]
-fn configure<'a>(input: &File, slot: &'a mut Option<Node>) -> Result<&'a mut Node, End> {
+fn receive<'a>(input: &File, slot: &'a mut Option<Config>) -> Result<&'a Config, End> {
     let mut record = [0; CONFIG_LEN];
     input.read(&mut record)?;
-    let config = config_from_bytes(&record).ok_or(End)?;
-    Ok(slot.insert(Node::new(config)))
+    Ok(slot.insert(config_from_bytes(&record).ok_or(End)?))
+}
+
+#[inline(never)]
+fn build<'a>(config: &Config, slot: &'a mut Option<Node>) -> &'a mut Node {
+    slot.insert(Node::new(*config))
+}
+
+/// Answers until the host goes away.
+#[inline(never)]
+fn serve(input: &File, output: &File, node: &mut Node, reply: &mut Reply) -> Result<(), End> {
+    let mut record = [0; REQUEST_LEN];
+    while input.read(&mut record).is_ok() {
+        reply.clear();
+        let measured = match Request::from_bytes(&record).ok_or(End)? {
+            Request::Poll { now, frame } => poll(node, now, frame, reply),
+            Request::Stack => stack::used() as u32,
+        };
+        output.write(reply.finish(measured))?;
+    }
+    Ok(())
+}
+
+/// Calls the node; returns the timer ticks it took, up to 2^24.
+fn poll(node: &mut Node, now: u64, received: Option<CanFrame>, reply: &mut Reply) -> u32 {
+    let mut port = Port { received, reply };
+    let before = SYST::get_current();
+    node.poll(now, &mut port);
+    before.wrapping_sub(SYST::get_current()) & SYST_MAX
 }
 
 /// SysTick from the core clock. It does not interrupt: the host's records drive this board.
-fn start(timer: &mut SYST) {
+fn start_timer(timer: &mut SYST) {
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(SYST_MAX);
     timer.clear_current();
     timer.enable_counter();
-}
-
-fn decimal(number: usize) -> [u8; 6] {
-    let mut digits = [b'0'; 6];
-    let mut left = number;
-    for digit in digits.iter_mut().rev() {
-        *digit = b'0' + (left % 10) as u8;
-        left /= 10;
-    }
-    digits
 }
 
 /// The node's end of the channel.

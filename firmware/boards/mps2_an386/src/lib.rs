@@ -30,16 +30,14 @@ use protocol::frame::{CanFrame, ExtendedId, FrameKind, Id, StandardId};
 pub const TO_BOARD: &CStr = c"to-board";
 /// FIFO that the board writes and the host reads.
 pub const FROM_BOARD: &CStr = c"from-board";
-/// File that the board leaves behind when the host has closed its end: the most stack it has used, bytes, in decimal.
-pub const STACK_REPORT: &CStr = c"stack-used";
 
 /// Bytes of the configuration record; more than any configuration takes, the rest is zero.
 pub const CONFIG_LEN: usize = 768;
 /// Bytes of a frame: identifier and flags (4), length (1), FD flags (1), reserved (2), data (64).
 pub const FRAME_LEN: usize = 72;
-/// Bytes of a request: time (8), number of frames (1), frame.
+/// Bytes of a request: kind (1), time (8), frame.
 pub const REQUEST_LEN: usize = 9 + FRAME_LEN;
-/// Bytes of a reply before its frames: their number (4), timer ticks (4).
+/// Bytes of a reply before its frames: their number (4), a measured number (4).
 pub const REPLY_HEADER: usize = 8;
 /// Frames that one poll may send: one control sample sends a handful, its reply queue at most eight more.
 pub const REPLY_FRAMES: usize = 16;
@@ -64,41 +62,63 @@ pub fn config_from_bytes(bytes: &[u8; CONFIG_LEN]) -> Option<Config> {
     postcard::from_bytes(bytes).ok()
 }
 
-/// One call of the node: the time, and the frame that has arrived.
+/// What the host asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Request {
-    /// Time, µs.
-    pub now: u64,
-    /// Frame, if one has come.
-    pub frame: Option<CanFrame>,
+pub enum Request {
+    /// Call the node. The answer holds what it sent, and the timer ticks that it took.
+    Poll {
+        /// Time, µs.
+        now: u64,
+        /// The frame that has come, if any.
+        frame: Option<CanFrame>,
+    },
+    /// Report the most stack used so far: an answer without frames, with bytes instead of ticks.
+    Stack,
 }
+
+/// First byte of a request.
+const POLL: u8 = 0;
+const POLL_WITH_FRAME: u8 = 1;
+const STACK: u8 = 2;
 
 impl Request {
     /// The record.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; REQUEST_LEN] {
         let mut bytes = [0; REQUEST_LEN];
-        put(&mut bytes, 0, &self.now.to_le_bytes());
-        if let Some(frame) = &self.frame {
-            put(&mut bytes, 8, &[1]);
-            put(&mut bytes, 9, &frame_to_bytes(frame));
+        match self {
+            Self::Poll { now, frame: None } => {
+                put(&mut bytes, 0, &[POLL]);
+                put(&mut bytes, 1, &now.to_le_bytes());
+            }
+            Self::Poll {
+                now,
+                frame: Some(frame),
+            } => {
+                put(&mut bytes, 0, &[POLL_WITH_FRAME]);
+                put(&mut bytes, 1, &now.to_le_bytes());
+                put(&mut bytes, 9, &frame_to_bytes(frame));
+            }
+            Self::Stack => put(&mut bytes, 0, &[STACK]),
         }
         bytes
     }
 
-    /// The request in a record, or `None` if it holds no valid frame where it says that there is one.
+    /// The request in a record, or `None` if it holds none.
     #[must_use]
     pub fn from_bytes(bytes: &[u8; REQUEST_LEN]) -> Option<Self> {
-        let (now, rest) = bytes.split_first_chunk::<8>()?;
-        let (&present, record) = rest.split_first()?;
-        let frame = match present {
-            0 => None,
-            _ => Some(frame_from_bytes(record.first_chunk()?)?),
-        };
-        Some(Self {
-            now: u64::from_le_bytes(*now),
-            frame,
-        })
+        let (&kind, rest) = bytes.split_first()?;
+        let (now, record) = rest.split_first_chunk()?;
+        let now = u64::from_le_bytes(*now);
+        match kind {
+            POLL => Some(Self::Poll { now, frame: None }),
+            POLL_WITH_FRAME => {
+                let frame = Some(frame_from_bytes(record.first_chunk()?)?);
+                Some(Self::Poll { now, frame })
+            }
+            STACK => Some(Self::Stack),
+            _ => None,
+        }
     }
 }
 
@@ -146,17 +166,17 @@ impl Reply {
         Ok(())
     }
 
-    /// The record; `ticks` is what a timer counted during the call.
-    pub fn finish(&mut self, ticks: u32) -> &[u8] {
+    /// The record; `measured` is a number that the request asked for.
+    pub fn finish(&mut self, measured: u32) -> &[u8] {
         put(&mut self.bytes, 0, &(self.frames as u32).to_le_bytes());
-        put(&mut self.bytes, 4, &ticks.to_le_bytes());
+        put(&mut self.bytes, 4, &measured.to_le_bytes());
         self.bytes
             .get(..REPLY_HEADER + self.frames * FRAME_LEN)
             .unwrap_or_default()
     }
 }
 
-/// Number of frames and timer ticks in the header of a reply.
+/// Number of frames and measured number in the header of a reply.
 #[must_use]
 pub fn reply_header(header: [u8; REPLY_HEADER]) -> (u32, u32) {
     let [a, b, c, d, e, f, g, h] = header;
@@ -171,10 +191,10 @@ pub fn reply_header(header: [u8; REPLY_HEADER]) -> (u32, u32) {
 pub fn frame_to_bytes(frame: &CanFrame) -> [u8; FRAME_LEN] {
     let (remote, flags) = match frame.kind() {
         FrameKind::Classical { remote } => (remote, 0),
-        FrameKind::Fd { brs, esi } => (false, FDF | u8::from(brs) * BRS | u8::from(esi) * ESI),
+        FrameKind::Fd { brs, esi } => (false, FDF | (u8::from(brs) * BRS) | (u8::from(esi) * ESI)),
     };
     let id =
-        frame.raw_id() | u32::from(frame.is_extended()) * EXTENDED | u32::from(remote) * REMOTE;
+        frame.raw_id() | (u32::from(frame.is_extended()) * EXTENDED) | (u32::from(remote) * REMOTE);
     let len = if remote {
         usize::from(frame.dlc())
     } else {
@@ -251,7 +271,7 @@ mod tests {
 
         #[test]
         fn every_request_comes_back(now: u64, frame in proptest::option::of(any_frame())) {
-            let request = Request { now, frame };
+            let request = Request::Poll { now, frame };
             prop_assert_eq!(Request::from_bytes(&request.to_bytes()), Some(request));
         }
 

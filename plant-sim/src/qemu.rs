@@ -1,0 +1,125 @@
+//! The controller as an image on an emulated Cortex-M4F, in lock-step, and held against its twin to the byte.
+
+mod board;
+mod difference;
+mod image;
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+use std::rc::Rc;
+
+use firmware::controller::Config;
+use firmware::node::Node;
+use mps2_an386::Request;
+use protocol::frame::CanFrame;
+
+use crate::endpoint::{Endpoint, EndpointError, InProcess};
+use board::Board;
+
+/// What the emulation is asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The image; `None` builds it from the sources.
+    pub image: Option<PathBuf>,
+    /// Count instructions: the emulated clock then moves by instructions and by nothing else. Slower.
+    pub count: Option<Rc<RefCell<Measured>>>,
+}
+
+/// What a run has cost the board.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Measured {
+    /// Every call of the node.
+    pub polls: Vec<Poll>,
+    /// Most stack used, bytes.
+    pub stack: u32,
+}
+
+/// What one call of the node has cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Poll {
+    /// Instructions from frame in to frames out.
+    pub instructions: u32,
+    /// Identifier of the frame that came, if any.
+    pub received: Option<u32>,
+    /// Whether a move was being planned.
+    pub planning: bool,
+}
+
+/// The controller in QEMU with its twin in this process.
+#[derive(Debug)]
+pub struct Qemu {
+    twin: InProcess,
+    expected: Vec<CanFrame>,
+    board: Board,
+    count: Option<Rc<RefCell<Measured>>>,
+}
+
+impl Qemu {
+    /// Starts the emulator with the image and tells the board its configuration.
+    ///
+    /// # Errors
+    /// The image cannot be built, the emulator is missing or does not answer; each with what to do about it.
+    pub fn start(config: Config, options: &Options) -> Result<Self, EndpointError> {
+        let image = match &options.image {
+            Some(image) => image.clone(),
+            None => image::build()?,
+        };
+        Ok(Self {
+            twin: InProcess::new(config),
+            expected: Vec::new(),
+            board: Board::start(&image, &config, options.count.is_some())?,
+            count: options.count.clone(),
+        })
+    }
+}
+
+impl Endpoint for Qemu {
+    fn poll(
+        &mut self,
+        now: u64,
+        received: Option<&CanFrame>,
+        sent: &mut Vec<CanFrame>,
+    ) -> Result<(), EndpointError> {
+        let first = sent.len();
+        let request = Request::Poll {
+            now,
+            frame: received.copied(),
+        };
+        let ticks = self.board.ask(&request, sent)?;
+        self.expected.clear();
+        self.twin.poll(now, received, &mut self.expected)?;
+        if let Some(what) = difference::first(&self.expected, &sent[first..], now) {
+            return Err(failure(what));
+        }
+        if let Some(count) = &self.count {
+            count.borrow_mut().polls.push(Poll {
+                instructions: board::instructions(ticks),
+                received: received.map(CanFrame::raw_id),
+                planning: self.twin.node().controller().is_planning(),
+            });
+        }
+        Ok(())
+    }
+
+    fn node(&self) -> &Node {
+        self.twin.node()
+    }
+}
+
+impl Drop for Qemu {
+    /// The board is asked for its stack at the very end, when the deepest path has been taken.
+    fn drop(&mut self) {
+        if let Some(count) = &self.count
+            && let Ok(stack) = self.board.ask(&Request::Stack, &mut Vec::new())
+        {
+            count.borrow_mut().stack = stack;
+        }
+    }
+}
+
+fn failure(what: impl Into<String>) -> EndpointError {
+    EndpointError {
+        who: "in QEMU".into(),
+        what: what.into(),
+    }
+}

@@ -1,0 +1,43 @@
+//! Finds the image by building it: a build that has nothing to do takes a moment, and a stale image is never run.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use super::failure;
+use crate::endpoint::EndpointError;
+
+/// Package and program.
+const PACKAGE: &str = "mps2-an386";
+
+/// Builds the image; returns where it is.
+pub fn build() -> Result<PathBuf, EndpointError> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/board/cargo");
+    if !script.exists() {
+        return Err(failure(format!(
+            "cannot be built: the sources are no longer at {}; give an image by --image FILE",
+            env!("CARGO_MANIFEST_DIR")
+        )));
+    }
+    let output = Command::new(&script)
+        .args(["build", "--release", "--quiet", "--package", PACKAGE])
+        .arg("--message-format=json-render-diagnostics")
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(|error| failure(format!("cannot be built: {}: {error}", script.display())))?;
+    if !output.status.success() {
+        return Err(failure(format!(
+            "cannot be built: {} says why above",
+            script.display()
+        )));
+    }
+    executable(&output.stdout)
+        .ok_or_else(|| failure(format!("cannot be built: cargo names no program {PACKAGE}")))
+}
+
+/// The program among cargo's messages, one JSON object a line.
+fn executable(messages: &[u8]) -> Option<PathBuf> {
+    messages.split(|byte| *byte == b'\n').find_map(|line| {
+        let message: serde_json::Value = serde_json::from_slice(line).ok()?;
+        Some(PathBuf::from(message["executable"].as_str()?))
+    })
+}
