@@ -316,7 +316,17 @@ impl Controller {
             // The brake holds: what it carries must not be taken for a disturbance.
             self.memory = Memory::new();
         }
-        let torque = self.config.selection.torque(&situation, &mut self.memory);
+        let mut torque = self.config.selection.torque(&situation, &mut self.memory);
+        if !torque.iter().all(|torque| torque.is_finite()) {
+            // Nothing finite that comes in leads here; should it happen, the brake is the answer.
+            self.memory = Memory::new();
+            torque = Vector4::zeros();
+            self.fail(Finding {
+                cause: Cause::BadValue,
+                axis: None,
+                value: 0.0,
+            });
+        }
         Actions {
             control: self.control_word(),
             torque: self.limit(&torque),
