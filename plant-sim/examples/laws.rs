@@ -1,0 +1,61 @@
+//! The table of docs/motion.md: every control law on the gate, with the right and a wrong model.
+
+use plant_sim::model::RobotModel;
+use plant_sim::run::{RunConfig, execute};
+use plant_sim::scenario::Scenario;
+
+const LAWS: [&str; 10] = [
+    "kinematic-joint",
+    "kinematic-task",
+    "pid",
+    "pd-gravity",
+    "computed-torque:none",
+    "computed-torque:integral",
+    "computed-torque:observer",
+    "computed-torque-task:none",
+    "computed-torque-task:integral",
+    "computed-torque-task:observer",
+];
+
+fn main() {
+    println!(
+        "| law | model | rate Hz | cycle s | error max mm | error rms mm | settling ms | final error mm |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for rate in [1000.0, 2000.0] {
+        for name in ["gate", "gate-mismatch"] {
+            for law in LAWS {
+                row(name, law, rate);
+            }
+        }
+    }
+}
+
+fn row(name: &str, law: &str, rate: f64) {
+    let mut scenario = Scenario::open(name).expect("built in");
+    scenario.law = law.parse().expect("a law's name");
+    scenario.rate_hz = rate;
+    let config = RunConfig {
+        scenario,
+        model: RobotModel::irb_930_22_105(),
+        plant_model: RobotModel::irb_930_22_105(),
+        seed: 1,
+    };
+    let summary = match execute(&config, None) {
+        Ok(summary) => summary,
+        Err(error) => return println!("| {law} | {name} | {rate} | {error} |"),
+    };
+    let model = if name == "gate" { "right" } else { "wrong" };
+    let cycle = summary
+        .cycle_time_s
+        .map_or("-".into(), |time| format!("{:.3}", time.mean));
+    let settling = summary
+        .settle_time_s
+        .map_or("> dwell".into(), |time| format!("{:.1}", time.max * 1e3));
+    let last = summary.final_error_mm.max.unwrap_or(f64::NAN);
+    let error = summary.tracking_error_mm;
+    println!(
+        "| {law} | {model} | {rate} | {cycle} | {:.3} | {:.3} | {settling} | {last:.4} |",
+        error.max, error.rms
+    );
+}
