@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::{CanFrame, ExtendedId, StandardId};
-use protocol::link::{Link, LinkAddress, LinkError, SlcanPeer};
+use protocol::link::{Clients, Link, LinkAddress, LinkError, SlcanHub, SlcanPeer};
 
 /// Long enough for any machine; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);
@@ -41,6 +41,7 @@ fn addresses_read_back_as_they_were_written() {
         "slcan:/dev/ttyACM0",
         "slcan:tcp:localhost:29536",
         "slcan:tcp:[::1]:1",
+        "slcan:listen:0.0.0.0:29536",
     ] {
         let address: LinkAddress = text.parse().unwrap();
         assert_eq!(address.to_string(), text);
@@ -59,6 +60,7 @@ fn what_is_no_address_is_refused_with_the_allowed_forms() {
         "slcan:",
         "slcan:tcp:",
         "slcan:tcp:host",
+        "slcan:listen:",
         "slcan:tcp::1",
         "slcan:tcp:host:65536",
         "udp:1",
@@ -130,4 +132,73 @@ fn a_peer_that_has_gone_is_reported() {
         }
     };
     assert!(matches!(failure, LinkError::Closed { .. }), "{failure}");
+}
+
+fn hub(may: Clients) -> (SlcanHub, LinkAddress) {
+    let hub = SlcanHub::bind("127.0.0.1:0", may).unwrap();
+    let address = SlcanPeer::Tcp(hub.local_address().unwrap().to_string());
+    (hub, LinkAddress::Slcan(address))
+}
+
+/// Lets the hub work until the link has a frame.
+fn carried(hub: &mut SlcanHub, link: &mut Link) -> CanFrame {
+    loop {
+        hub.exchange();
+        if link.wait(Duration::from_millis(1)).unwrap() {
+            return link.receive().unwrap();
+        }
+    }
+}
+
+#[test]
+fn what_one_client_of_a_hub_sends_all_others_receive_and_nobody_twice() {
+    let (hub, address) = hub(Clients::TakePart);
+    let mut links = [0, 1, 2].map(|_| Link::open(&address).unwrap());
+    let frame = |id| CanFrame::fd(StandardId::new(id).unwrap(), &[id as u8; 48], true).unwrap();
+    for link in &mut links {
+        link.transmit(&frame(7)).unwrap();
+    }
+    // Once the hub has a client's frame it has its opening, and all three hear the next frame.
+    let mut link = Link::SlcanHub(hub);
+    for _ in 0..3 {
+        while !link.wait(LIMIT).unwrap() {}
+        assert_eq!(link.receive(), Some(frame(7)));
+    }
+    let Link::SlcanHub(mut hub) = link else {
+        unreachable!("made so");
+    };
+    hub.transmit(&frame(6)).unwrap();
+    for link in &mut links {
+        while carried(&mut hub, link) != frame(6) {}
+    }
+    let [first, second, third] = &mut links;
+    first.transmit(&frame(8)).unwrap();
+    assert_eq!(carried(&mut hub, second), frame(8));
+    assert_eq!(carried(&mut hub, third), frame(8));
+    hub.transmit(&frame(9)).unwrap();
+    // The sender's own frame did not come back: the next that it hears is the hub's.
+    assert_eq!(carried(&mut hub, first), frame(9));
+}
+
+#[test]
+fn a_hub_to_watch_refuses_frames_and_answers_like_an_adapter() {
+    let (mut hub, address) = hub(Clients::Watch);
+    let LinkAddress::Slcan(SlcanPeer::Tcp(server)) = &address else {
+        unreachable!("made so");
+    };
+    let mut peer = TcpStream::connect(server).unwrap();
+    // As python-can opens a bus.
+    peer.write_all(b"C\rS8\r\rO\rV\rN\rt1230\r?\r").unwrap();
+    peer.set_nonblocking(true).unwrap();
+    let expected = b"\r\r\r\rV1010\r\x07\x07\x07";
+    let mut answer: Vec<u8> = Vec::new();
+    while answer.len() < expected.len() {
+        hub.exchange();
+        let mut buffer = [0; 64];
+        match peer.read(&mut buffer) {
+            Ok(count) => answer.extend(&buffer[..count]),
+            Err(error) => assert_eq!(error.kind(), std::io::ErrorKind::WouldBlock),
+        }
+    }
+    assert_eq!(answer, expected);
 }

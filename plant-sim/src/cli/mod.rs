@@ -3,6 +3,7 @@
 mod dbc;
 mod eval;
 mod run;
+mod timing;
 mod trace;
 
 use std::io::{self, Write as _};
@@ -27,6 +28,8 @@ enum Command {
     Run(run::RunArgs),
     /// Compute kinematics or dynamics for the rows of a CSV table on standard input.
     Eval(eval::EvalArgs),
+    /// Measure how regular the loop with an external controller is, beside what watches over it.
+    Timing(timing::TimingArgs),
     /// Look into a recorded trace.
     #[command(subcommand)]
     Trace(trace::TraceCommand),
@@ -41,6 +44,7 @@ pub fn main() -> Result<ExitCode, String> {
         None => run::run(&cli.run),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Eval(args)) => eval::run(&args),
+        Some(Command::Timing(args)) => timing::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),
         Some(Command::Dbc(args)) => dbc::run(&args),
     }

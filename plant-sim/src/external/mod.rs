@@ -10,7 +10,9 @@
 //! - *Real time*: samples are taken at absolute deadlines of the machine's clock. A command that is late acts late.
 
 mod compare;
+mod measure;
 mod peers;
+mod picture;
 mod realtime;
 mod timing;
 
@@ -31,7 +33,9 @@ use protocol::table;
 use crate::endpoint::{Endpoint, EndpointError};
 
 pub use compare::first_difference;
+pub use measure::measure;
 use peers::sender;
+pub use picture::histogram;
 pub use realtime::RealTime;
 pub use timing::{Distribution, Timing};
 

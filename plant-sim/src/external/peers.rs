@@ -39,9 +39,12 @@ pub fn meet(address: &LinkAddress) -> Result<Remote, EndpointError> {
     let began = Instant::now();
     let mut told = false;
     loop {
-        // A controller that is already there hears this before the first sample; one that starts later needs it not.
+        // A waiting plant is heard by another that starts.
         remote.send(&reset())?;
         if hear(&mut remote, RETRY, true)? {
+            // Whether the controller has heard that or has just started by itself cannot be known: it starts afresh
+            // now, and the first sample comes after.
+            remote.send(&reset())?;
             if told {
                 eprintln!("plant-sim: the controller is there");
             }

@@ -84,7 +84,12 @@ impl RealTime {
         };
         let deadline = origin + self.period * self.sample;
         sleep_until(deadline);
-        self.timing.woke(deadline, monotonic());
+        let now = monotonic();
+        self.timing.woke(deadline, now);
+        if now >= deadline + self.period {
+            // Samples that were missed are not made up for in a burst: time slips, and the controller gets its share.
+            self.origin = Some(now.saturating_sub(self.period * self.sample));
+        }
     }
 
     fn deadline(&self) -> Duration {

@@ -141,6 +141,24 @@ impl Timing {
         self.overruns
     }
 
+    /// Nominal period.
+    pub fn period(&self) -> Duration {
+        self.period
+    }
+
+    /// What watches over the loop, and when it acts.
+    pub fn limits(&self) -> [(&'static str, Duration); 4] {
+        [
+            ("command before the next sample", self.period),
+            ("drives hold the last torque", self.period * HOLD_SAMPLES),
+            ("controller bridges missing samples", self.period * MAX_GAP),
+            (
+                "controller takes drives for silent",
+                Duration::from_micros(PEER_TIMEOUT_US),
+            ),
+        ]
+    }
+
     /// Percentiles, and what was measured beside each limit that watches over it.
     pub fn report(&self) -> String {
         let mut text = String::new();
@@ -173,27 +191,10 @@ impl Timing {
             "watchdogs                             limit   measured     margin  us"
         );
         // Until a sample was late and its command after that, whatever was watched has waited this long.
-        let worst = us(self.lateness.max() + self.latency.max());
-        let gap = us(self.period + self.jitter.max());
-        let period = us(self.period);
-        for (name, limit, measured) in [
-            ("command before the next sample", period, worst),
-            (
-                "drives hold the last torque",
-                period * f64::from(HOLD_SAMPLES),
-                worst,
-            ),
-            (
-                "controller bridges missing samples",
-                period * f64::from(MAX_GAP),
-                gap,
-            ),
-            (
-                "controller takes drives for silent",
-                PEER_TIMEOUT_US as f64,
-                gap,
-            ),
-        ] {
+        let worst = self.lateness.max() + self.latency.max();
+        let gap = self.period + self.jitter.max();
+        for ((name, limit), measured) in self.limits().into_iter().zip([worst, worst, gap, gap]) {
+            let (limit, measured) = (us(limit), us(measured));
             let _ = writeln!(
                 text,
                 "  {name:<34} {limit:8.0} {measured:10.0} {:10.0}{}",

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::string::{String, ToString};
 
-/// A bus and the way to it: `socketcan:can0`, `slcan:/dev/ttyACM0` or `slcan:tcp:HOST:PORT`.
+/// A bus and the way to it: `socketcan:can0`, `slcan:/dev/ttyACM0`, `slcan:tcp:HOST:PORT` or
+/// `slcan:listen:HOST:PORT`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LinkAddress {
     /// Network interface.
@@ -21,6 +22,8 @@ pub enum SlcanPeer {
     Terminal(PathBuf),
     /// TCP server, host and port.
     Tcp(String),
+    /// Whoever connects to this TCP port: see [`SlcanHub`](super::SlcanHub).
+    Listen(String),
 }
 
 /// The text is no address of a bus.
@@ -35,7 +38,7 @@ impl fmt::Display for AddressError {
         write!(
             f,
             "{:?} is no bus; allowed: socketcan:INTERFACE (socketcan:can0), slcan:TERMINAL (slcan:/dev/ttyACM0), \
-             slcan:tcp:HOST:PORT (slcan:tcp:localhost:29536)",
+             slcan:tcp:HOST:PORT (slcan:tcp:localhost:29536), slcan:listen:HOST:PORT (slcan:listen:localhost:29536)",
             self.text
         )
     }
@@ -54,19 +57,26 @@ impl FromStr for LinkAddress {
                     .bytes()
                     .all(|byte| byte.is_ascii_graphic() && byte != b'/'))
             .then(|| Self::SocketCan(name.to_string())),
-            Some(("slcan", peer)) => match peer.strip_prefix("tcp:") {
-                Some(server) => server
-                    .rsplit_once(':')
-                    .filter(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok())
-                    .map(|_| SlcanPeer::Tcp(server.to_string())),
-                None => (!peer.is_empty()).then(|| SlcanPeer::Terminal(PathBuf::from(peer))),
-            }
-            .map(Self::Slcan),
+            Some(("slcan", peer)) => slcan_peer(peer).map(Self::Slcan),
             _ => None,
         };
         address.ok_or_else(|| AddressError {
             text: text.to_string(),
         })
+    }
+}
+
+fn slcan_peer(text: &str) -> Option<SlcanPeer> {
+    let server = |text: &str| {
+        let (host, port) = text.rsplit_once(':')?;
+        (!host.is_empty() && port.parse::<u16>().is_ok()).then(|| text.to_string())
+    };
+    if let Some(text) = text.strip_prefix("tcp:") {
+        server(text).map(SlcanPeer::Tcp)
+    } else if let Some(text) = text.strip_prefix("listen:") {
+        server(text).map(SlcanPeer::Listen)
+    } else {
+        (!text.is_empty()).then(|| SlcanPeer::Terminal(PathBuf::from(text)))
     }
 }
 
@@ -84,6 +94,7 @@ impl fmt::Display for SlcanPeer {
         match self {
             Self::Terminal(path) => write!(f, "{}", path.display()),
             Self::Tcp(server) => write!(f, "tcp:{server}"),
+            Self::Listen(server) => write!(f, "listen:{server}"),
         }
     }
 }

@@ -5,19 +5,21 @@
 
 mod address;
 pub mod realtime;
+mod slcan_hub;
 mod slcan_port;
 mod socketcan;
 
 use std::boxed::Box;
 use std::fmt;
 use std::io;
-use std::os::fd::{AsFd, BorrowedFd};
+use std::os::fd::AsFd;
 use std::string::String;
 use std::time::{Duration, SystemTime};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 pub use address::{AddressError, LinkAddress, SlcanPeer};
+pub use slcan_hub::{Clients, SlcanHub};
 pub use slcan_port::SlcanPort;
 pub use socketcan::SocketCan;
 
@@ -140,6 +142,8 @@ pub enum Link {
     SocketCan(SocketCan),
     /// A serial line.
     Slcan(Box<SlcanPort>),
+    /// The serial lines of whoever connects.
+    SlcanHub(SlcanHub),
 }
 
 impl Link {
@@ -150,6 +154,9 @@ impl Link {
     pub fn open(address: &LinkAddress) -> Result<Self, LinkError> {
         match address {
             LinkAddress::SocketCan(interface) => SocketCan::open(interface).map(Self::SocketCan),
+            LinkAddress::Slcan(SlcanPeer::Listen(server)) => {
+                SlcanHub::bind(server, Clients::TakePart).map(Self::SlcanHub)
+            }
             LinkAddress::Slcan(peer) => {
                 SlcanPort::open(peer).map(|port| Self::Slcan(Box::new(port)))
             }
@@ -168,6 +175,7 @@ impl Link {
         let ready = match self {
             Self::SocketCan(link) => link.ready(timeout)?,
             Self::Slcan(link) => link.ready(timeout)?,
+            Self::SlcanHub(link) => link.ready(timeout)?,
         };
         self.take_failure().map_or(Ok(ready), Err)
     }
@@ -177,6 +185,7 @@ impl Link {
         match self {
             Self::SocketCan(link) => link.take(),
             Self::Slcan(link) => link.take(),
+            Self::SlcanHub(link) => link.take(),
         }
     }
 
@@ -184,6 +193,8 @@ impl Link {
         match self {
             Self::SocketCan(link) => link.failure.take(),
             Self::Slcan(link) => link.failure.take(),
+            // Clients come and go.
+            Self::SlcanHub(_) => None,
         }
     }
 }
@@ -197,15 +208,7 @@ impl Bus for Link {
         match self {
             Self::SocketCan(link) => link.transmit(frame),
             Self::Slcan(link) => link.transmit(frame),
-        }
-    }
-}
-
-impl AsFd for Link {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        match self {
-            Self::SocketCan(link) => link.as_fd(),
-            Self::Slcan(link) => link.as_fd(),
+            Self::SlcanHub(link) => link.transmit(frame),
         }
     }
 }
@@ -216,11 +219,16 @@ fn poll_for(descriptor: impl AsFd, output: bool, timeout: Duration) -> io::Resul
     if output {
         events |= PollFlags::OUT;
     }
+    poll_all(&mut [PollFd::new(&descriptor, events)], timeout)
+}
+
+/// Waits for an event on any of the descriptors. A signal ends the wait.
+fn poll_all(descriptors: &mut [PollFd<'_>], timeout: Duration) -> io::Result<bool> {
     let timeout = Timespec::try_from(timeout).unwrap_or(Timespec {
         tv_sec: 1,
         tv_nsec: 0,
     });
-    match poll(&mut [PollFd::new(&descriptor, events)], Some(&timeout)) {
+    match poll(descriptors, Some(&timeout)) {
         Ok(ready) => Ok(ready > 0),
         Err(rustix::io::Errno::INTR) => Ok(false),
         Err(error) => Err(error.into()),

@@ -78,7 +78,7 @@ impl SlcanPort {
     pub fn open(peer: &SlcanPeer) -> Result<Self, LinkError> {
         let opened = match peer {
             SlcanPeer::Terminal(path) => open_terminal(path).map(Port::Terminal),
-            SlcanPeer::Tcp(server) => connect(server).map(Port::Tcp),
+            SlcanPeer::Tcp(server) | SlcanPeer::Listen(server) => connect(server).map(Port::Tcp),
         };
         let port = opened.map_err(|source| LinkError::io(format!("open slcan:{peer}"), source))?;
         let mut link = Self {
@@ -196,12 +196,6 @@ impl SlcanPort {
             }
             _ => self.failure = Some(LinkError::io(format!("{what} {}", self.peer), error)),
         }
-    }
-}
-
-impl AsFd for SlcanPort {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.port.as_fd()
     }
 }
 

@@ -3,7 +3,6 @@
 use std::format;
 use std::fs;
 use std::io;
-use std::os::fd::{AsFd, BorrowedFd};
 use std::string::{String, ToString};
 use std::time::{Duration, SystemTime};
 use std::vec::Vec;
@@ -152,12 +151,6 @@ impl SocketCan {
                 TransmitError::Offline
             }
         }
-    }
-}
-
-impl AsFd for SocketCan {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
     }
 }
 

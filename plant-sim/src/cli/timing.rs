@@ -1,0 +1,44 @@
+//! `plant-sim timing`: how regular the loop is on this machine and this bus.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Args;
+use plant_sim::external::{histogram, measure};
+use plant_sim::scenario;
+use protocol::link::LinkAddress;
+
+use super::show;
+
+/// Arguments of `timing`.
+#[derive(Args)]
+pub struct TimingArgs {
+    /// The bus, with a controller on it (controller --bus BUS --real-time): socketcan:INTERFACE,
+    /// slcan:TERMINAL or slcan:tcp:HOST:PORT.
+    #[arg(long, value_name = "BUS")]
+    bus: LinkAddress,
+    /// Sampling rate.
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    rate: f64,
+    /// Duration.
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=86_400))]
+    seconds: u32,
+    /// Where the histogram goes.
+    #[arg(long, value_name = "FILE", default_value = "timing.svg")]
+    svg: PathBuf,
+}
+
+/// Measures, prints percentiles and margins, draws the histogram.
+pub fn run(args: &TimingArgs) -> Result<ExitCode, String> {
+    scenario::check_rate(args.rate)
+        .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
+    let time = Duration::from_secs(args.seconds.into());
+    let timing = measure(&args.bus, args.rate, time).map_err(|error| error.to_string())?;
+    fs::write(&args.svg, histogram(&timing))
+        .map_err(|error| format!("cannot write {}: {error}", args.svg.display()))?;
+    show(&timing.report())?;
+    show(&format!("histogram in {}\n", args.svg.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
