@@ -4,7 +4,7 @@
 
 mod source;
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -281,18 +281,28 @@ fn each(
     Ok(())
 }
 
-/// The file, or standard output.
+/// The file, or standard output. A file appears under its name when it is complete: until then it is a partial one.
 fn sink(out: Option<&Path>) -> io::Result<BufWriter<Box<dyn Write>>> {
     let sink: Box<dyn Write> = match out {
-        Some(path) => Box::new(File::create(path)?),
+        Some(path) => Box::new(File::create(partial(path))?),
         None => Box::new(io::stdout().lock()),
     };
     Ok(BufWriter::with_capacity(1 << 16, sink))
 }
 
+fn partial(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".partial");
+    name.into()
+}
+
 /// Does the writing. A reader of standard output that has seen enough and gone (`| head`) is no error.
 fn written(out: Option<&Path>, write: impl FnOnce() -> Result<(), Failure>) -> Result<(), String> {
-    match (write(), out) {
+    let result = write().and_then(|()| match out {
+        Some(path) => Ok(fs::rename(partial(path), path)?),
+        None => Ok(()),
+    });
+    match (result, out) {
         (Ok(()), _) => Ok(()),
         (Err(Failure::Input(message)), _) => Err(message),
         (Err(Failure::Output(error)), None) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),

@@ -91,7 +91,7 @@ fn frame_line(channel: usize, frame: &CanFrame) -> String {
         let _ = write!(line, " {byte:02X}");
     }
     if let FrameKind::Fd { brs, esi } = frame.kind() {
-        let flags = FLAG_FDF | u32::from(brs) * FLAG_BRS | u32::from(esi) * FLAG_ESI;
+        let flags = FLAG_FDF | (u32::from(brs) * FLAG_BRS) | (u32::from(esi) * FLAG_ESI);
         // Duration, length in bits, flags, CRC and four words of bit timing; unknown is 0.
         let _ = write!(
             line,

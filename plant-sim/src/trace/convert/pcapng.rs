@@ -115,7 +115,7 @@ fn frame_packet(frame: &CanFrame) -> Vec<u8> {
         // Carries no data, but tells the length asked for.
         FrameKind::Classical { remote: true } => packet(id | REMOTE_FLAG, frame.dlc(), 0, &[]),
         FrameKind::Fd { brs, esi } => {
-            let flags = FLAG_FDF | u8::from(brs) * FLAG_BRS | u8::from(esi) * FLAG_ESI;
+            let flags = FLAG_FDF | (u8::from(brs) * FLAG_BRS) | (u8::from(esi) * FLAG_ESI);
             packet(id, frame.data().len() as u8, flags, frame.data())
         }
     }
