@@ -7,6 +7,8 @@
 //! There is one call and it is total: every input gives an output, the work is bounded, nothing
 //! is allocated and no clock is read. Time is the number of samples.
 
+mod requests;
+
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
@@ -17,18 +19,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::arm::{ArmModel, Payload};
 use crate::body::Body;
-use crate::kinematics::{Pose, Trig};
+use crate::kinematics::Trig;
 use crate::laws::{Gains, Memory, Selection, Situation};
-use crate::math::clamp;
+use crate::limits;
 use crate::mode::{self, Event};
 use crate::monitor::{Finding, Monitor, MonitorLimits};
+use crate::trajectory::Reference;
 use crate::trajectory::capacity::Capacity;
-use crate::trajectory::clock::Clock;
-use crate::trajectory::planner::{Planner, Request, Target};
-use crate::trajectory::{Reference, Trajectory};
+use crate::trajectory::queue::{CAPACITY, MoveQueue, Progress};
+use requests::Answer;
 
-/// Planned moves and requests that may wait, each.
-pub const QUEUE: usize = 4;
 /// Samples that a gap in the feedback may span before the arm is stopped.
 pub const MAX_GAP: u32 = 5;
 
@@ -116,12 +116,7 @@ pub struct Controller {
     /// Samples until the brake has opened.
     opening: u32,
     shutdown: Shutdown,
-    planner: Planner,
-    requests: Deque<Request, QUEUE>,
-    moves: Deque<Trajectory, QUEUE>,
-    clock: Clock,
-    /// Where the last planned move ends: the next one starts there.
-    plan_end: Vector4<f32>,
+    queue: MoveQueue,
     /// The reference of the last sample, as handed to the law.
     reference: Reference,
     memory: Memory,
@@ -129,8 +124,7 @@ pub struct Controller {
     saturated: Vector4<f32>,
     limited: u16,
     error: Vector4<f32>,
-    completed: u8,
-    replies: Deque<MotionReply, { 2 * QUEUE }>,
+    replies: Deque<MotionReply, { 2 * CAPACITY }>,
 }
 
 impl Controller {
@@ -147,18 +141,13 @@ impl Controller {
             alarm: None,
             opening: 0,
             shutdown: Shutdown::Off,
-            planner: Planner::new(),
-            requests: Deque::new(),
-            moves: Deque::new(),
-            clock: Clock::default(),
-            plan_end: Vector4::zeros(),
+            queue: MoveQueue::new(),
             reference: Reference::rest(Vector4::zeros()),
             memory: Memory::new(),
             monitor: Monitor::default(),
             saturated: Vector4::zeros(),
             limited: 0,
             error: Vector4::zeros(),
-            completed: 0,
             replies: Deque::new(),
         }
     }
@@ -205,18 +194,17 @@ impl Controller {
 
     /// Moves planned or waiting.
     pub fn queued(&self) -> u8 {
-        let planning = usize::from(!self.planner.is_idle());
-        u8::try_from(self.moves.len() + self.requests.len() + planning).unwrap_or(u8::MAX)
+        self.queue.len()
     }
 
     /// Whether a move is being planned: what makes a sample expensive.
     pub fn is_planning(&self) -> bool {
-        !self.planner.is_idle()
+        self.queue.is_planning()
     }
 
     /// Number of the last move that was completed.
     pub fn completed(&self) -> u8 {
-        self.completed
+        self.queue.completed()
     }
 
     /// An answer to an operator that is due.
@@ -283,7 +271,7 @@ impl Controller {
         if !self.is_holding() {
             // No torque: follow the arm, so that switching on starts where it stands.
             self.reference = Reference::rest(q);
-            self.plan_end = q;
+            self.queue.clear(&q);
             self.error = Vector4::zeros();
             self.limited = 0;
             self.saturated = Vector4::zeros();
@@ -293,7 +281,8 @@ impl Controller {
             };
         }
         self.plan();
-        let (reference, ahead) = self.advance(readings.steps.min(MAX_GAP));
+        let reference = self.advance(readings.steps.min(MAX_GAP));
+        let lead = self.config.command_delay + 0.5 * self.config.period;
         self.reference = reference;
         self.error = reference.q - q;
 
@@ -308,7 +297,7 @@ impl Controller {
             torque: measured_torque,
             reference,
             mean_qd: mean_velocity(&reference, period),
-            ahead,
+            ahead: extrapolate(&reference, lead),
             period,
             saturated: self.saturated,
         };
@@ -327,123 +316,13 @@ impl Controller {
                 value: 0.0,
             });
         }
+        let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
+        self.saturated = limited.saturated;
+        self.limited = limited.flags;
         Actions {
             control: self.control_word(),
-            torque: self.limit(&torque),
+            torque: limited.motor_torque.into(),
         }
-    }
-
-    // --- requests -------------------------------------------------------------------------
-
-    fn judge(&mut self, sequence: u8, request: &MotionRequest) -> Result<Answer, Refusal> {
-        let idle = matches!(self.mode, Mode::Ready | Mode::PreOperational)
-            || (self.mode == Mode::Enabled && self.queued() == 0);
-        let answer = match request {
-            MotionRequest::Enable => return self.operate(Event::Enable),
-            MotionRequest::Disable if self.queued() > 0 => {
-                return Err(Refusal::because(RefusalReason::Moving));
-            }
-            MotionRequest::Disable => return self.operate(Event::Disable),
-            MotionRequest::FaultReset => {
-                if self.shutdown != Shutdown::Off {
-                    return Err(Refusal::because(RefusalReason::Moving));
-                }
-                return self.operate(Event::Reset);
-            }
-            MotionRequest::Stop => {
-                self.drop_queued();
-                if self.mode == Mode::Enabled {
-                    // Planned, not begun: there is nothing to brake.
-                    self.moves.clear();
-                    self.plan_end = self.reference.q;
-                }
-                self.event(Event::Stop, Cause::None);
-                Answer::Now
-            }
-            MotionRequest::MoveJoint { target, speed } => {
-                self.enqueue(sequence, Target::Joints(Vector4::from(*target)), *speed)?
-            }
-            MotionRequest::MoveLine { target, speed } => {
-                self.enqueue(sequence, Target::Line(pose(target)), *speed)?
-            }
-            MotionRequest::Jump {
-                target,
-                top,
-                clearance,
-                speed,
-            } => {
-                let target = Target::Jump {
-                    pose: pose(target),
-                    top: *top,
-                    clearance: *clearance,
-                };
-                self.enqueue(sequence, target, *speed)?
-            }
-            _ if !idle => return Err(Refusal::because(RefusalReason::Moving)),
-            MotionRequest::SetPayload { mass, com, inertia } => {
-                let limit = self.config.arm.payload_max;
-                if *mass > limit {
-                    return Err(Refusal::value(RefusalReason::PayloadTooHeavy, *mass, limit));
-                }
-                self.config.payload = Payload {
-                    mass: *mass,
-                    com: (*com).into(),
-                    inertia: (*inertia).into(),
-                };
-                self.body = Body::new(&self.config.arm, &self.config.payload);
-                self.memory = Memory::new();
-                Answer::Now
-            }
-            MotionRequest::SelectLaw { law, compensation } => {
-                self.config.selection.law = *law;
-                self.config.selection.compensation = *compensation;
-                self.memory = Memory::new();
-                Answer::Now
-            }
-            MotionRequest::SetGains {
-                bandwidth,
-                damping,
-                observer,
-            } => {
-                let gains = Gains {
-                    bandwidth: *bandwidth,
-                    damping: *damping,
-                    observer: *observer,
-                };
-                gains.check(self.config.period)?;
-                self.config.selection.gains = gains;
-                self.memory = Memory::new();
-                Answer::Now
-            }
-        };
-        Ok(answer)
-    }
-
-    fn operate(&mut self, event: Event) -> Result<Answer, Refusal> {
-        if mode::transition(self.mode, event).is_none() {
-            return Err(Refusal::because(RefusalReason::WrongState));
-        }
-        self.event(event, Cause::None);
-        Ok(Answer::Now)
-    }
-
-    fn enqueue(&mut self, sequence: u8, target: Target, speed: f32) -> Result<Answer, Refusal> {
-        match self.mode {
-            Mode::Enabled | Mode::Moving => {}
-            Mode::Ready | Mode::Enabling => {
-                return Err(Refusal::because(RefusalReason::NotEnabled));
-            }
-            _ => return Err(Refusal::because(RefusalReason::WrongState)),
-        }
-        let request = Request {
-            sequence,
-            target,
-            speed,
-        };
-        self.requests
-            .push_back(request)
-            .map_err(|_| Refusal::because(RefusalReason::QueueFull))?;
-        Ok(Answer::WhenPlanned)
     }
 
     fn reply(&mut self, sequence: u8, outcome: Outcome) {
@@ -463,15 +342,15 @@ impl Controller {
             }
             Mode::Disabling => self.shutdown = Shutdown::Closing(brake),
             Mode::FaultReaction | Mode::EStop => {
-                self.drop_queued();
+                self.withdraw();
                 self.shutdown = match self.shutdown {
                     Shutdown::Off if was_powered => Shutdown::Stopping,
                     already => already,
                 };
             }
             Mode::Fault => {
-                self.drop_queued();
-                self.moves.clear();
+                self.withdraw();
+                self.queue.clear(&self.reference.q);
                 self.shutdown = Shutdown::Off;
             }
             Mode::PreOperational => self.cause = Cause::None,
@@ -549,13 +428,12 @@ impl Controller {
     }
 
     /// Refuses what waits to be planned; planned moves go when the arm has come to rest.
-    fn drop_queued(&mut self) {
-        let stopped = Outcome::Refused(Refusal::because(RefusalReason::Stopped));
-        if let Some(sequence) = self.planner.cancel() {
-            self.reply(sequence, stopped);
-        }
-        while let Some(request) = self.requests.pop_front() {
-            self.reply(request.sequence, stopped);
+    fn withdraw(&mut self) {
+        while let Some(sequence) = self.queue.withdraw() {
+            self.reply(
+                sequence,
+                Outcome::Refused(Refusal::because(RefusalReason::Stopped)),
+            );
         }
     }
 
@@ -564,148 +442,45 @@ impl Controller {
             arm: &self.config.arm,
             body: &self.body,
         };
-        if self.planner.is_idle() {
-            if self.moves.is_full() {
-                return;
-            }
-            let Some(request) = self.requests.pop_front() else {
-                return;
-            };
-            if let Err(refusal) = self
-                .planner
-                .begin(&self.config.arm, &request, &self.plan_end)
-            {
-                self.reply(request.sequence, Outcome::Refused(refusal));
-            }
-            return;
-        }
-        match self.planner.work(&capacity) {
+        match self.queue.plan(&capacity) {
             None => {}
-            Some(Ok(trajectory)) => {
-                self.plan_end = trajectory.end;
-                let _ = self.moves.push_back(trajectory);
-                self.reply(trajectory.sequence, Outcome::Accepted);
-            }
-            Some(Err(refusal)) => {
-                let sequence = self.planner.sequence();
-                self.reply(sequence, Outcome::Refused(refusal));
-            }
+            Some((sequence, Ok(()))) => self.reply(sequence, Outcome::Accepted),
+            Some((sequence, Err(refusal))) => self.reply(sequence, Outcome::Refused(refusal)),
         }
     }
 
-    /// The reference at this sample and in the middle of the time its command will act.
-    fn advance(&mut self, steps: u32) -> (Reference, Reference) {
-        let period = self.config.period;
-        if self.mode == Mode::Enabled && !self.moves.is_empty() {
-            self.clock = Clock::default();
+    /// The reference at this sample.
+    fn advance(&mut self, steps: u32) -> Reference {
+        if self.mode == Mode::Enabled {
+            if !self.queue.is_ready() {
+                return Reference::rest(self.reference.q);
+            }
             self.event(Event::Start, Cause::None);
         }
         let stopping = self.is_stopping();
-        let reference = match self.moves.front() {
-            Some(trajectory) if self.mode != Mode::Enabled => {
-                if !self.clock.is_stopped() {
-                    for _ in 0..steps {
-                        self.clock.advance(period);
-                    }
-                }
-                let t = self.clock.time(period);
-                let ended = t >= trajectory.duration();
-                // A verified path stays in reach; should arithmetic disagree, the arm holds.
-                let planned = trajectory
-                    .at(&self.config.arm, t)
-                    .unwrap_or(Reference::rest(self.reference.q));
-                if stopping {
-                    self.clock.brake(
-                        &planned,
-                        &trajectory.braking,
-                        &self.config.arm.limits,
-                        period,
-                    );
-                }
-                let braked = self.clock.apply(&planned);
-                let sequence = trajectory.sequence;
-                let stopped = stopping && (self.clock.is_stopped() || ended);
-                if stopped {
-                    self.come_to_rest(&braked.q);
-                    Reference::rest(braked.q)
-                } else {
-                    if ended {
-                        self.finish(sequence);
-                    }
-                    braked
-                }
-            }
-            _ => {
-                if stopping {
-                    let here = self.reference.q;
-                    self.come_to_rest(&here);
-                }
-                Reference::rest(self.reference.q)
-            }
-        };
-        let lead = self.config.command_delay + 0.5 * period;
-        (reference, extrapolate(&reference, lead))
-    }
-
-    fn finish(&mut self, sequence: u8) {
-        self.moves.pop_front();
-        self.completed = sequence;
-        self.clock = Clock::default();
-        if self.moves.is_empty() {
-            self.event(Event::Arrived, Cause::None);
+        let (reference, progress) = self.queue.advance(
+            &self.config.arm,
+            steps,
+            self.config.period,
+            stopping,
+            &self.reference.q,
+        );
+        match progress {
+            Progress::UnderWay => {}
+            Progress::Arrived if stopping => self.come_to_rest(&reference.q),
+            Progress::Arrived => self.event(Event::Arrived, Cause::None),
         }
+        reference
     }
 
     fn come_to_rest(&mut self, q: &Vector4<f32>) {
-        self.moves.clear();
-        self.plan_end = *q;
-        self.clock = Clock::default();
+        self.queue.clear(q);
         if self.mode == Mode::QuickStop {
             self.event(Event::AtRest, Cause::None);
         } else {
             self.shutdown = Shutdown::Closing(self.brake_samples());
         }
     }
-
-    /// Cuts joint torques to the limits of joints and motors and turns them into motor torques.
-    fn limit(&mut self, torque: &Vector4<f32>) -> [f32; 4] {
-        let arm = &self.config.arm;
-        let effort = &arm.limits.effort;
-        let joint = torque.zip_map(effort, |t, limit| clamp(t, -limit, limit));
-        let wanted = self.body.drive.motor_torque(&joint);
-        let motor = wanted.zip_map(&arm.drive.motor_torque_limit, |t, limit| {
-            clamp(t, -limit, limit)
-        });
-        let cut = |asked: f32, given: f32| {
-            if asked > given {
-                1.0
-            } else if asked < given {
-                -1.0
-            } else {
-                0.0
-            }
-        };
-        let joint_cut = torque.zip_map(&joint, cut);
-        let motor_cut = wanted.zip_map(&motor, cut);
-        self.saturated = joint_cut.zip_map(&motor_cut, |j, m| if j == 0.0 { m } else { j });
-        self.limited = self
-            .saturated
-            .iter()
-            .zip([1u16, 2, 4, 8])
-            .filter(|(cut, _)| **cut != 0.0)
-            .fold(0, |flags, (_, bit)| flags | bit);
-        [motor.x, motor.y, motor.z, motor.w]
-    }
-}
-
-enum Answer {
-    Now,
-    WhenPlanned,
-}
-
-fn pose(target: &[f32; 4]) -> Pose {
-    let [x, y, z, yaw] = *target;
-    Pose { x, y, z, yaw }
 }
 
 /// Mean velocity over the sample that ends at `reference`, exact for constant jerk.

@@ -33,6 +33,7 @@ pub mod dynamics;
 pub mod jacobian;
 pub mod kinematics;
 pub mod laws;
+pub mod limits;
 pub mod math;
 pub mod mode;
 pub mod monitor;

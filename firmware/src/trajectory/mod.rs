@@ -13,6 +13,8 @@ pub mod clock;
 pub mod path;
 pub mod planner;
 pub mod profile;
+pub mod queue;
+pub mod request;
 
 use nalgebra::Vector4;
 

@@ -20,12 +20,11 @@ use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
 use super::capacity::Capacity;
-use super::path::{Path, PathError, PathPoint, check_limits};
+use super::path::{Path, PathPoint, check_limits};
 use super::profile::{Bounds, SCurve};
+use super::request::{Gate, Request, from_ik, from_path};
 use super::{Lift, Trajectory};
 use crate::arm::ArmModel;
-use crate::kinematics::{self, Elbow, IkError, Pose};
-use crate::math::wrap;
 
 /// Samples of path or trajectory that one tick looks at: the bound on planning work per tick.
 pub const SAMPLES_PER_TICK: u8 = 2;
@@ -43,35 +42,6 @@ const LINE_SHARE: f32 = 0.9;
 const STEP: f32 = 1.6;
 /// Moves whose every axis travels less than this (rad or m) end where they begin.
 const NO_TRAVEL: f32 = 1e-6;
-
-/// What to move to. Lengths in m in frame 0 (z up), angles in rad.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Target {
-    /// Straight in joint space to these joint positions.
-    Joints(Vector4<f32>),
-    /// Straight line of the tool.
-    Line(Pose),
-    /// Gate move: up, across (straight in joint space), down.
-    Jump {
-        /// Tool pose at the end.
-        pose: Pose,
-        /// Height of the tool at the top.
-        top: f32,
-        /// Height that is strictly vertical at both ends; above it the corners are blended.
-        clearance: f32,
-    },
-}
-
-/// A move to plan.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Request {
-    /// Number by which the operator knows the move.
-    pub sequence: u8,
-    /// Where to.
-    pub target: Target,
-    /// Share of full speed, 0 < speed <= 1.
-    pub speed: f32,
-}
 
 /// Progress of the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,13 +72,6 @@ pub struct Planner {
     speed: f32,
     /// Clearance and rises of a jump: up, down, clearance.
     gate: Option<Gate>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Gate {
-    rise: f32,
-    fall: f32,
-    clearance: f32,
 }
 
 impl Planner {
@@ -177,7 +140,6 @@ impl Planner {
         from: &Vector4<f32>,
     ) -> Result<(), Refusal> {
         self.stage = Stage::Idle;
-        self.gate = None;
         if !(request.speed > 0.0 && request.speed <= 1.0) {
             return Err(Refusal::value(
                 RefusalReason::OutOfRange,
@@ -185,26 +147,8 @@ impl Planner {
                 1.0,
             ));
         }
-        let path = match &request.target {
-            Target::Joints(q) => {
-                check_limits(arm, q).map_err(from_ik)?;
-                straight(from, q)
-            }
-            Target::Line(pose) => line(arm, from, pose)?,
-            Target::Jump {
-                pose,
-                top,
-                clearance,
-            } => {
-                let elbow = Elbow::of(from);
-                let q = kinematics::inverse(arm, pose, elbow, from).map_err(from_ik)?;
-                let gate = gate(arm, from, &q, *top, *clearance)?;
-                self.gate = Some(gate);
-                let mut across = q;
-                across.z = from.z;
-                straight(from, &across)
-            }
-        };
+        let (path, gate) = request.target.path(arm, from)?;
+        self.gate = gate;
         self.speed = request.speed;
         self.draft = Trajectory {
             path,
@@ -470,85 +414,5 @@ fn stroke(length: f32, bounds: &Bounds) -> SCurve {
         SCurve::new(length, bounds)
     } else {
         SCurve::default()
-    }
-}
-
-fn straight(from: &Vector4<f32>, to: &Vector4<f32>) -> Path {
-    Path::Joint {
-        start: *from,
-        delta: to - from,
-    }
-}
-
-fn line(arm: &ArmModel, from: &Vector4<f32>, to: &Pose) -> Result<Path, Refusal> {
-    let elbow = Elbow::of(from);
-    kinematics::inverse(arm, to, elbow, from).map_err(from_ik)?;
-    let start = kinematics::forward(&arm.geometry, from);
-    Ok(Path::Line {
-        start,
-        delta: Vector4::new(
-            to.x - start.x,
-            to.y - start.y,
-            to.z - start.z,
-            wrap(to.yaw - start.yaw),
-        ),
-        elbow,
-        wrist_turns: from.w - (from.x + from.y - start.yaw),
-    })
-}
-
-/// Heights of a jump; the top must lie above both ends and inside the stroke.
-fn gate(
-    arm: &ArmModel,
-    from: &Vector4<f32>,
-    to: &Vector4<f32>,
-    top: f32,
-    clearance: f32,
-) -> Result<Gate, Refusal> {
-    if !(top.is_finite() && clearance.is_finite()) {
-        return Err(Refusal::because(RefusalReason::NotFinite));
-    }
-    let d3_top = arm.geometry.d1 - arm.geometry.d4 - top;
-    let mut highest = *to;
-    highest.z = d3_top;
-    check_limits(arm, &highest).map_err(from_ik)?;
-    let (rise, fall) = (from.z - d3_top, to.z - d3_top);
-    if rise < 0.0 || fall < 0.0 || clearance < 0.0 {
-        return Err(Refusal::value(
-            RefusalReason::OutOfRange,
-            rise.min(fall).min(clearance),
-            0.0,
-        ));
-    }
-    Ok(Gate {
-        rise,
-        fall,
-        clearance,
-    })
-}
-
-/// The refusal that tells an operator what inverse kinematics found.
-pub fn from_ik(error: IkError) -> Refusal {
-    match error {
-        IkError::NotFinite => Refusal::because(RefusalReason::NotFinite),
-        IkError::TooFar { radius, max } => Refusal::value(RefusalReason::TooFar, radius, max),
-        IkError::TooNear { radius, min } => Refusal::value(RefusalReason::TooNear, radius, min),
-        IkError::Limit { axis, value, limit } => Refusal {
-            reason: RefusalReason::JointLimit,
-            axis: axis as u8,
-            value,
-            limit,
-        },
-    }
-}
-
-fn from_path(error: PathError) -> Refusal {
-    match error {
-        PathError::Unreachable(error) => from_ik(error),
-        PathError::Singular { sin_elbow } => Refusal::value(
-            RefusalReason::Singular,
-            sin_elbow.abs(),
-            super::path::MIN_SIN_ELBOW,
-        ),
     }
 }

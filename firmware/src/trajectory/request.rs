@@ -1,0 +1,159 @@
+//! What an operator asks for, and the path that it means.
+
+use nalgebra::Vector4;
+use protocol::messages::{Refusal, RefusalReason};
+
+use super::path::{MIN_SIN_ELBOW, Path, PathError, check_limits};
+use crate::arm::ArmModel;
+use crate::kinematics::{self, Elbow, IkError, Pose};
+use crate::math::wrap;
+
+/// What to move to. Lengths in m in frame 0 (z up), angles in rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// Straight in joint space to these joint positions.
+    Joints(Vector4<f32>),
+    /// Straight line of the tool.
+    Line(Pose),
+    /// Gate move: up, across (straight in joint space), down.
+    Jump {
+        /// Tool pose at the end.
+        pose: Pose,
+        /// Height of the tool at the top.
+        top: f32,
+        /// Height that is strictly vertical at both ends; above it the corners are blended.
+        clearance: f32,
+    },
+}
+
+/// A move to plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Number by which the operator knows the move.
+    pub sequence: u8,
+    /// Where to.
+    pub target: Target,
+    /// Share of full speed, 0 < speed <= 1.
+    pub speed: f32,
+}
+
+/// Heights of a jump, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Gate {
+    /// From the start to the top.
+    pub(super) rise: f32,
+    /// From the top to the end.
+    pub(super) fall: f32,
+    /// Strictly vertical at both ends.
+    pub(super) clearance: f32,
+}
+
+impl Target {
+    /// The path from the joint positions `from`, and the heights of a jump over it.
+    ///
+    /// # Errors
+    /// A target that is not finite, out of reach or outside a limit.
+    pub(super) fn path(
+        &self,
+        arm: &ArmModel,
+        from: &Vector4<f32>,
+    ) -> Result<(Path, Option<Gate>), Refusal> {
+        match self {
+            Self::Joints(q) => {
+                check_limits(arm, q).map_err(from_ik)?;
+                Ok((straight(from, q), None))
+            }
+            Self::Line(pose) => Ok((line(arm, from, pose)?, None)),
+            Self::Jump {
+                pose,
+                top,
+                clearance,
+            } => {
+                let q = kinematics::inverse(arm, pose, Elbow::of(from), from).map_err(from_ik)?;
+                let gate = gate(arm, from, &q, *top, *clearance)?;
+                let mut across = q;
+                across.z = from.z;
+                Ok((straight(from, &across), Some(gate)))
+            }
+        }
+    }
+}
+
+fn straight(from: &Vector4<f32>, to: &Vector4<f32>) -> Path {
+    Path::Joint {
+        start: *from,
+        delta: to - from,
+    }
+}
+
+fn line(arm: &ArmModel, from: &Vector4<f32>, to: &Pose) -> Result<Path, Refusal> {
+    let elbow = Elbow::of(from);
+    kinematics::inverse(arm, to, elbow, from).map_err(from_ik)?;
+    let start = kinematics::forward(&arm.geometry, from);
+    Ok(Path::Line {
+        start,
+        delta: Vector4::new(
+            to.x - start.x,
+            to.y - start.y,
+            to.z - start.z,
+            wrap(to.yaw - start.yaw),
+        ),
+        elbow,
+        wrist_turns: from.w - (from.x + from.y - start.yaw),
+    })
+}
+
+/// Heights of a jump; the top must lie above both ends and inside the stroke.
+fn gate(
+    arm: &ArmModel,
+    from: &Vector4<f32>,
+    to: &Vector4<f32>,
+    top: f32,
+    clearance: f32,
+) -> Result<Gate, Refusal> {
+    if !(top.is_finite() && clearance.is_finite()) {
+        return Err(Refusal::because(RefusalReason::NotFinite));
+    }
+    let d3_top = arm.geometry.d1 - arm.geometry.d4 - top;
+    let mut highest = *to;
+    highest.z = d3_top;
+    check_limits(arm, &highest).map_err(from_ik)?;
+    let (rise, fall) = (from.z - d3_top, to.z - d3_top);
+    if rise < 0.0 || fall < 0.0 || clearance < 0.0 {
+        return Err(Refusal::value(
+            RefusalReason::OutOfRange,
+            rise.min(fall).min(clearance),
+            0.0,
+        ));
+    }
+    Ok(Gate {
+        rise,
+        fall,
+        clearance,
+    })
+}
+
+/// The refusal that tells an operator what inverse kinematics found.
+pub(super) fn from_ik(error: IkError) -> Refusal {
+    match error {
+        IkError::NotFinite => Refusal::because(RefusalReason::NotFinite),
+        IkError::TooFar { radius, max } => Refusal::value(RefusalReason::TooFar, radius, max),
+        IkError::TooNear { radius, min } => Refusal::value(RefusalReason::TooNear, radius, min),
+        IkError::Limit { axis, value, limit } => Refusal {
+            reason: RefusalReason::JointLimit,
+            axis: axis as u8,
+            value,
+            limit,
+        },
+    }
+}
+
+/// The refusal that tells an operator why a point of a path cannot be reached.
+pub(super) fn from_path(error: PathError) -> Refusal {
+    match error {
+        PathError::Unreachable(error) => from_ik(error),
+        PathError::Singular { sin_elbow } => {
+            Refusal::value(RefusalReason::Singular, sin_elbow.abs(), MIN_SIN_ELBOW)
+        }
+    }
+}
