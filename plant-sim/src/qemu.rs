@@ -86,6 +86,7 @@ impl Endpoint for Qemu {
             frame: received.copied(),
         };
         let ticks = self.board.ask(&request, sent)?;
+        let planning = self.twin.node().controller().is_planning();
         self.expected.clear();
         self.twin.poll(now, received, &mut self.expected)?;
         if let Some(what) = difference::first(&self.expected, &sent[first..], now) {
@@ -95,7 +96,7 @@ impl Endpoint for Qemu {
             count.borrow_mut().polls.push(Poll {
                 instructions: board::instructions(ticks),
                 received: received.map(CanFrame::raw_id),
-                planning: self.twin.node().controller().is_planning(),
+                planning: planning || self.twin.node().controller().is_planning(),
             });
         }
         Ok(())

@@ -11,6 +11,8 @@ fn main() -> std::io::Result<()> {
     let out = env::var_os("OUT_DIR").ok_or(std::io::ErrorKind::NotFound)?;
     fs::copy("memory.x", Path::new(&out).join("memory.x"))?;
     println!("cargo::rustc-link-search={}", Path::new(&out).display());
-    println!("cargo::rustc-link-arg-bins=-Tlink.x");
+    for programs in ["bins", "examples"] {
+        println!("cargo::rustc-link-arg-{programs}=-Tlink.x");
+    }
     Ok(())
 }

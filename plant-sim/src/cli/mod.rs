@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand.
 
+mod cost;
 mod dbc;
 mod eval;
 mod run;
@@ -26,6 +27,8 @@ struct Cli {
 enum Command {
     /// Run a scenario (the default command).
     Run(run::RunArgs),
+    /// Count the instructions and the stack that the controller takes on the emulated Cortex-M4F.
+    Cost(cost::CostArgs),
     /// Compute kinematics or dynamics for the rows of a CSV table on standard input.
     Eval(eval::EvalArgs),
     /// Measure how regular the loop with an external controller is, beside what watches over it.
@@ -43,6 +46,7 @@ pub fn main() -> Result<ExitCode, String> {
     match cli.command {
         None => run::run(&cli.run),
         Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Cost(args)) => cost::run(&args),
         Some(Command::Eval(args)) => eval::run(&args),
         Some(Command::Timing(args)) => timing::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),
