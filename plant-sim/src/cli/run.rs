@@ -6,13 +6,14 @@ use std::process::ExitCode;
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use plant_sim::external::{LockStep, RealTime};
+use plant_sim::endpoint::InProcess;
+use plant_sim::external::{LockStep, RealTime, Watched};
 use plant_sim::model::RobotModel;
 use plant_sim::qemu::{self, Qemu};
 use plant_sim::run::{self, RunConfig, Summary};
 use plant_sim::scenario::{self, Scenario};
 use plant_sim::selection::LawChoice;
-use protocol::link::{AddressError, LinkAddress};
+use protocol::link::{AddressError, LinkAddress, SlcanPeer};
 
 use super::show;
 
@@ -51,6 +52,10 @@ pub struct RunArgs {
     /// The image for --controller qemu, instead of the one built from the sources.
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
+    /// Show the built-in bus to CAN tools: they connect to slcan:tcp:HOST:PORT and take it for an
+    /// adapter. The run waits for the first and goes at the speed of the clock.
+    #[arg(long, value_name = "slcan:tcp:HOST:PORT")]
+    listen: Option<LinkAddress>,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -132,6 +137,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     };
     let summary = match place {
         Place::InProcess => run::execute(&config, Some(&args.out)),
+        Place::Watched(server) => run::execute_with(&config, Some(&args.out), |config| {
+            Watched::new(InProcess::new(config), server)
+        }),
         Place::Qemu => {
             let options = qemu::Options {
                 image: args.image.clone(),
@@ -172,6 +180,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
 /// Where the controller is, with what that needs.
 enum Place<'a> {
     InProcess,
+    Watched(&'a str),
     Qemu,
     LockStep(&'a LinkAddress),
     RealTime(&'a LinkAddress),
@@ -180,6 +189,9 @@ enum Place<'a> {
 /// Puts together what belongs together: a link and an external controller need each other, and an
 /// external controller brings its own model of the robot.
 fn place(args: &RunArgs) -> Result<Place<'_>, String> {
+    if args.listen.is_some() && !matches!(args.controller, ControllerChoice::InProcess) {
+        return Err("--listen shows the built-in bus of a controller in this process; the bus of an external one can be watched itself".into());
+    }
     match (args.controller, &args.bus) {
         (ControllerChoice::External, BusChoice::Link(_)) if args.model.is_some() => Err(
             "--model is what the controller believes, and an external one has its own; use --plant-model".into(),
@@ -195,6 +207,12 @@ fn place(args: &RunArgs) -> Result<Place<'_>, String> {
             "--bus {bus} leads to an external controller: add --controller external, and start it with: controller --bus {bus}"
         )),
         _ if args.real_time => Err("--real-time needs --controller external".into()),
+        (ControllerChoice::InProcess, BusChoice::Builtin) if args.listen.is_some() => {
+            match &args.listen {
+                Some(LinkAddress::Slcan(SlcanPeer::Tcp(server))) => Ok(Place::Watched(server)),
+                _ => Err("--listen allows slcan:tcp:HOST:PORT only".into()),
+            }
+        }
         (ControllerChoice::InProcess, BusChoice::Builtin) => Ok(Place::InProcess),
         (ControllerChoice::Qemu, BusChoice::Builtin) => Ok(Place::Qemu),
     }

@@ -15,6 +15,7 @@ mod peers;
 mod picture;
 mod realtime;
 mod timing;
+mod watch;
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -38,6 +39,7 @@ use peers::sender;
 pub use picture::histogram;
 pub use realtime::RealTime;
 pub use timing::{Distribution, Timing};
+pub use watch::Watched;
 
 /// Longest wait for an answer in lock-step. Only a controller that has stopped needs this long.
 const ANSWER_LIMIT: Duration = Duration::from_secs(2);

@@ -82,6 +82,12 @@ impl SlcanHub {
         self.listener.local_addr()
     }
 
+    /// Whether a client takes part in the bus.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.clients.iter().any(|client| client.open)
+    }
+
     /// Frames that clients who did not read have lost.
     #[must_use]
     pub fn lost(&self) -> u64 {
