@@ -7,7 +7,8 @@ use firmware::node::Node;
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
 
-use crate::rig::COMPUTE_NS;
+/// Time the controller takes from frame in to frame out, ns: 4000 instructions at 100 MHz.
+pub const COMPUTE_NS: u64 = 40_000;
 
 /// A controller somewhere, in lock-step with the rig.
 pub trait Endpoint {

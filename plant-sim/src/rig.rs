@@ -20,13 +20,11 @@ use crate::bus::{
     BitTiming, BuiltinBus, Delivery, FrameBits, NodeId, Overload, Statistics, Traffic,
 };
 use crate::drives::Drives;
-use crate::endpoint::{Endpoint, EndpointError};
+use crate::endpoint::{COMPUTE_NS, Endpoint, EndpointError};
 use crate::model::RobotModel;
 use crate::operator::{Hand, Operator, OperatorError};
 use crate::plant::Plant;
 
-/// Time the controller takes from frame in to frame out, ns: 4000 instructions at 100 MHz.
-pub const COMPUTE_NS: u64 = 40_000;
 /// Transmit mailboxes of a node: as many as an FDCAN or M_CAN has and more than it needs.
 const MAILBOXES: usize = 32;
 
