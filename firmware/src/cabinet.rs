@@ -1,12 +1,10 @@
 //! Pins of the drive cabinet, through embedded-hal: brake, safe torque off, stack light, e-stop.
 //!
-//! The pins show what the mode says and nothing else. Every output is written on every call, so
+//! The pins show what mode and control word say and nothing else. Every output is written on every call, so
 //! that a glitch lasts one sample; wiring is fail-safe: a low pin brakes and takes torque away.
 
 use embedded_hal::digital::{InputPin, OutputPin};
-use protocol::messages::Mode;
-
-use crate::mode;
+use protocol::messages::{ControlWord, Mode};
 
 /// Outputs and inputs of the cabinet.
 #[derive(Debug)]
@@ -36,13 +34,15 @@ where
     Red: OutputPin,
     EStop: InputPin,
 {
-    /// Writes all outputs for `mode`; `brake_open` is the brake bit of the last command.
+    /// Writes all outputs for `mode` and the control word of the last command. Torque follows the
+    /// command, not the mode: while the brake closes after a fault, torque still holds the load.
     ///
     /// # Errors
     /// [`PinFault`] if any pin failed; the others are written all the same.
-    pub fn show(&mut self, mode: Mode, brake_open: bool) -> Result<(), PinFault> {
+    pub fn show(&mut self, mode: Mode, control: ControlWord) -> Result<(), PinFault> {
         let alarm = matches!(mode, Mode::FaultReaction | Mode::Fault | Mode::EStop);
-        let torque = mode::is_powered(mode) || brake_open;
+        let brake_open = control.contains(ControlWord::BRAKE_RELEASE);
+        let torque = control.contains(ControlWord::TORQUE_ENABLE);
         let results = [
             self.brake.set_state(brake_open.into()).is_ok(),
             self.torque.set_state(torque.into()).is_ok(),

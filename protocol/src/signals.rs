@@ -109,7 +109,7 @@ pub const COMMAND: &[Signal] = &[
     signal("sample", 0, Kind::U32, one!("")),
     signal("control", 4, Kind::Flags8(ControlWord::NAMES), one!("")),
     // About twice the peak torque of the largest motor.
-    signal("torque", 5, range(-20.0, 20.0), motors!("N m")),
+    signal("torque", 5, range(-200.0, 200.0), motors!("N m")),
 ];
 
 /// Request of the operator.

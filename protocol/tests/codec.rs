@@ -82,7 +82,7 @@ proptest! {
         let value = f32::from_bits(bits);
         match codec::encode(&Message::Command(command), 1) {
             Ok(frame) => {
-                prop_assert!(value.abs() <= 20.0);
+                prop_assert!(value.abs() <= 200.0);
                 prop_assert_eq!(received, codec::decode(&frame));
                 prop_assert!(received.is_ok());
             }
@@ -90,7 +90,7 @@ proptest! {
                 // Bits, because a NaN does not equal itself.
                 prop_assert_eq!(format!("{:?}", received), format!("{:?}", Err::<Received, _>(DecodeError::Value(error))));
                 prop_assert_eq!(matches!(error, ValueError::NotFinite { .. }), !value.is_finite());
-                prop_assert!(!value.is_finite() || value.abs() > 20.0);
+                prop_assert!(!value.is_finite() || value.abs() > 200.0);
             }
             Err(EncodeError::TooLong) => prop_assert!(false),
         }
