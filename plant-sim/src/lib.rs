@@ -11,6 +11,7 @@ pub mod eval;
 pub mod external;
 pub mod metrics;
 pub mod model;
+pub mod monitor;
 pub mod operator;
 pub mod plant;
 pub mod qemu;

@@ -3,6 +3,7 @@
 mod cost;
 mod dbc;
 mod eval;
+mod monitor;
 mod run;
 mod timing;
 mod trace;
@@ -36,6 +37,8 @@ enum Command {
     /// Look into a recorded trace.
     #[command(subcommand)]
     Trace(trace::TraceCommand),
+    /// Watch a bus: identifiers, rates, values, load, states and faults.
+    Monitor(monitor::MonitorArgs),
     /// Write the messages of the link as a DBC file.
     Dbc(dbc::DbcArgs),
 }
@@ -50,6 +53,7 @@ pub fn main() -> Result<ExitCode, String> {
         Some(Command::Eval(args)) => eval::run(&args),
         Some(Command::Timing(args)) => timing::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),
+        Some(Command::Monitor(args)) => monitor::run(&args),
         Some(Command::Dbc(args)) => dbc::run(&args),
     }
 }

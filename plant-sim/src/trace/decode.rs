@@ -45,13 +45,7 @@ impl<W: Write> Decoder<W> {
     /// # Errors
     /// Those of the sink.
     pub fn record(&mut self, record: &Record) -> io::Result<()> {
-        let content = match &record.entry {
-            Entry::Frame(frame) => match Decoded::new(frame) {
-                Ok(decoded) => Content::Message(frame, decoded),
-                Err(error) => Content::Refused(frame, error),
-            },
-            Entry::Error(error) => Content::ErrorFrame(error),
-        };
+        let content = Content::new(record);
         match self.format {
             Format::Text => self.text(record, &content),
             Format::Csv => self.csv(record, &content),
@@ -78,17 +72,8 @@ impl<W: Write> Decoder<W> {
             content.id(),
             content.name()
         )?;
-        match content {
-            Content::Message(_, decoded) => {
-                if let Some(counter) = decoded.counter {
-                    write!(sink, " #{counter}")?;
-                }
-                for field in decoded.fields() {
-                    text_field(sink, field)?;
-                }
-            }
-            _ => write!(sink, " {}: {}", content.error(), content.raw())?,
-        }
+        write!(sink, " ")?;
+        content.words(sink)?;
         writeln!(sink)
     }
 
@@ -160,6 +145,15 @@ impl<W: Write> Decoder<W> {
     }
 }
 
+/// Counter and fields of a record in words, without time, interface and identifier.
+#[must_use]
+pub fn describe(record: &Record) -> String {
+    let mut text = Vec::new();
+    // A vector takes everything, and everything written is text.
+    let _ = Content::new(record).words(&mut text);
+    String::from_utf8_lossy(&text).into_owned()
+}
+
 /// What there is to say about a record.
 enum Content<'a> {
     Message(&'a CanFrame, Decoded),
@@ -167,7 +161,35 @@ enum Content<'a> {
     ErrorFrame(&'a ErrorFrame),
 }
 
-impl Content<'_> {
+impl<'a> Content<'a> {
+    fn new(record: &'a Record) -> Self {
+        match &record.entry {
+            Entry::Frame(frame) => match Decoded::new(frame) {
+                Ok(decoded) => Self::Message(frame, decoded),
+                Err(error) => Self::Refused(frame, error),
+            },
+            Entry::Error(error) => Self::ErrorFrame(error),
+        }
+    }
+
+    /// Counter and fields, or what is wrong and the bytes.
+    fn words(&self, sink: &mut impl Write) -> io::Result<()> {
+        let Self::Message(_, decoded) = self else {
+            return write!(sink, "{}: {}", self.error(), self.raw());
+        };
+        let mut separator = "";
+        if let Some(counter) = decoded.counter {
+            write!(sink, "#{counter}")?;
+            separator = "  ";
+        }
+        for field in decoded.fields() {
+            sink.write_all(separator.as_bytes())?;
+            separator = "  ";
+            text_field(sink, field)?;
+        }
+        Ok(())
+    }
+
     fn id(&self) -> String {
         match self {
             Self::Message(frame, _) | Self::Refused(frame, _) => id(frame),
@@ -229,9 +251,9 @@ impl std::fmt::Display for Seconds {
     }
 }
 
-/// ` name=value unit`, or ` name=(value, value) unit` if all elements share the unit.
+/// `name=value unit`, or `name=(value, value) unit` if all elements share the unit.
 fn text_field(sink: &mut impl Write, field: Field) -> io::Result<()> {
-    write!(sink, "  {}=", field.signal.name)?;
+    write!(sink, "{}=", field.signal.name)?;
     let elements = field.signal.elements;
     let common = elements
         .first()

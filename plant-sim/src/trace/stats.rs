@@ -85,18 +85,22 @@ impl Gatherer {
     #[must_use]
     pub fn statistics(&self) -> Statistics {
         let span_us = self.newest_us - self.first_us.unwrap_or(self.newest_us);
-        let load = |busy_ns: u64| busy_ns as f64 / (span_us * 1000).max(1) as f64;
+        // One instant has neither load nor rate.
+        let over = |sum: u64, span: f64| if span == 0.0 { 0.0 } else { sum as f64 / span };
+        let load = |busy_ns: u64| over(busy_ns, span_us as f64 * 1e3);
+        let rate = |frames: u64| over(frames, span_us as f64 / 1e6);
         Statistics {
             frames: self.ids.values().map(|tally| tally.frames).sum(),
             error_frames: self.error_frames,
             backwards: self.backwards,
             span_s: span_us as f64 / 1e6,
             load: load(self.busy_ns),
+            // A trace shorter than a window is its own busiest part.
             peak_load: (self.peak_ns as f64 / (WINDOW_US * 1000) as f64).max(load(self.busy_ns)),
             ids: self
                 .ids
                 .values()
-                .map(|tally| tally.line(load(tally.busy_ns), span_us))
+                .map(|tally| tally.line(load(tally.busy_ns), rate(tally.frames)))
                 .collect(),
         }
     }
@@ -182,7 +186,7 @@ impl Tally {
         }
     }
 
-    fn line(&self, load: f64, span_us: u64) -> IdStatistics {
+    fn line(&self, load: f64, rate_hz: f64) -> IdStatistics {
         let periods = (self.periods.count > 0).then(|| PeriodStatistics {
             min_ms: self.periods.min as f64 / 1e3,
             mean_ms: self.periods.mean / 1e3,
@@ -193,7 +197,7 @@ impl Tally {
             id: self.id.clone(),
             name: self.name,
             frames: self.frames,
-            rate_hz: self.frames as f64 / (span_us.max(1) as f64 / 1e6),
+            rate_hz,
             period: periods,
             gaps: self.gaps,
             lost: self.lost,

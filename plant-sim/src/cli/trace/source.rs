@@ -43,8 +43,9 @@ impl Read for Counted {
 
 impl Source {
     pub fn open(path: &Path) -> Result<Self, String> {
-        let name = path.display().to_string();
+        let mut name = path.display().to_string();
         let (input, size): (Box<dyn Read>, _) = if path == Path::new("-") {
+            name = "standard input".into();
             (Box::new(io::stdin()), None)
         } else {
             let file = File::open(path).map_err(|error| format!("cannot read {name}: {error}"))?;
