@@ -61,28 +61,30 @@ pub fn run(args: &CostArgs) -> Result<ExitCode, String> {
     }
 }
 
+/// Kinds of call, as the report names them.
+const KINDS: [&str; 4] = ["sample", "sample_planning", "other_frame", "no_frame"];
+
+fn kind(poll: &Poll) -> &'static str {
+    match poll.received {
+        None => "no_frame",
+        Some(id) if id != u32::from(FEEDBACK.id) => "other_frame",
+        Some(_) if poll.planning => "sample_planning",
+        Some(_) => "sample",
+    }
+}
+
 /// One line a kind of call, and the stack.
 fn report(measured: &Measured) -> String {
-    let feedback = u32::from(FEEDBACK.id);
-    let is_sample = |poll: &&Poll| poll.received == Some(feedback);
-    let lines: [(&str, &dyn Fn(&&Poll) -> bool); 4] = [
-        ("sample", &|poll| is_sample(poll) && !poll.planning),
-        ("sample_planning", &|poll| is_sample(poll) && poll.planning),
-        ("other_frame", &|poll| {
-            poll.received.is_some() && !is_sample(poll)
-        }),
-        ("no_frame", &|poll| poll.received.is_none()),
-    ];
     let mut text = String::from("call              calls    min  median     max   instructions\n");
-    for (name, belongs) in lines {
+    for name in KINDS {
         let mut counts: Vec<u32> = measured
             .polls
             .iter()
-            .filter(belongs)
+            .filter(|poll| kind(poll) == name)
             .map(|poll| poll.instructions)
             .collect();
         counts.sort_unstable();
-        if let [min, .., max] = counts[..] {
+        if let (Some(min), Some(max)) = (counts.first(), counts.last()) {
             let median = counts[counts.len() / 2];
             let calls = counts.len();
             let _ = writeln!(text, "{name:<16} {calls:>6} {min:>6} {median:>7} {max:>7}");
