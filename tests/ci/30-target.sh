@@ -64,5 +64,28 @@ if timeout 60 "$plant_sim" run --controller qemu --image "$doubles" --out "$scra
 fi
 grep -q 'the controller in QEMU did not answer' "$scratch/hung"
 
+echo "- QEMU ends with the run, even one that is killed"
+"$plant_sim" run --cycles 10000 --controller qemu --image "$image" --out "$scratch/killed" >/dev/null 2>&1 &
+run=$!
+emulator=
+for _ in $(seq 100); do
+    read -r emulator _ <"/proc/$run/task/$run/children" || true
+    [ -n "$emulator" ] && break
+    sleep 0.1
+done
+[ -n "$emulator" ]
+sleep 1
+kill -KILL "$run"
+wait "$run" 2>/dev/null || true
+for _ in $(seq 100); do
+    # A zombie has ended; whoever adopted it has yet to notice.
+    grep -q '^State:.*[^Z] (' "/proc/$emulator/status" 2>/dev/null || break
+    sleep 0.1
+done
+if grep '^State:.*[^Z] (' "/proc/$emulator/status" 2>/dev/null; then
+    echo "30-target: QEMU outlived the run" >&2
+    exit 1
+fi
+
 echo "- memory and instructions"
 timeout 200 python3 tests/board/budget.py "$image" "$plant_sim"
