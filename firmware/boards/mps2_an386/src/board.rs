@@ -105,7 +105,7 @@ impl Bus for Port<'_> {
     }
 }
 
-/// A hard fault, and with it a stack overflow, ends the emulation with an error: the host reports it.
+/// A hard fault ends the emulation with an error, which the host reports.
 #[exception]
 unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     host::exit(Err(End))
