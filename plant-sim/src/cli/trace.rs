@@ -8,6 +8,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Instant;
 
 use clap::{Args, Subcommand, ValueEnum};
 use firmware::arm::ArmModel;
@@ -19,9 +20,11 @@ use plant_sim::trace::Record;
 use plant_sim::trace::check::Checker;
 use plant_sim::trace::convert::{Converter, Target};
 use plant_sim::trace::decode::{Decoder, Format};
+use plant_sim::trace::play::{PlayError, Player};
 use plant_sim::trace::plot::Plot;
 use plant_sim::trace::replay::Replay;
 use plant_sim::trace::stats::Gatherer;
+use protocol::link::{Link, LinkAddress, SlcanPeer};
 
 use super::run::load;
 use super::show;
@@ -38,7 +41,7 @@ pub enum TraceCommand {
     Plot(PlotArgs),
     /// Judge the trace by the rules of the protocol; name the first offence.
     Check(CheckArgs),
-    /// Feed the trace into a fresh controller and compare its commands byte for byte.
+    /// Feed the trace into a fresh controller and compare its commands byte for byte; or, with --bus, play it onto a bus.
     Replay(ReplayArgs),
     /// Write the trace in the format of another tool.
     Convert(ConvertArgs),
@@ -103,14 +106,34 @@ pub struct CheckArgs {
 /// Arguments of `replay`.
 #[derive(Args)]
 pub struct ReplayArgs {
-    /// candump log that begins before the controller's first sample, or - for standard input.
+    /// candump log, or - for standard input. For the controller it must begin before its first sample.
     file: PathBuf,
     /// The robot that the recorded controller believed in (a model file).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "bus")]
     model: Option<PathBuf>,
     /// Control rate of the recorded controller.
-    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 1000.0,
+        conflicts_with = "bus"
+    )]
     rate: f64,
+    /// Play every frame onto this bus instead: socketcan:INTERFACE, slcan:TERMINAL, slcan:tcp:HOST:PORT or
+    /// slcan:listen:HOST:PORT.
+    #[arg(long, value_name = "BUS")]
+    bus: Option<LinkAddress>,
+    /// How many times as fast as recorded; 0: as fast as the bus takes the frames.
+    #[arg(long, value_name = "X", default_value_t = 1.0, requires = "bus", value_parser = speed)]
+    speed: f64,
+}
+
+/// A speed at which every time of a trace stays a time.
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(speed) if speed == 0.0 || (0.001..=1000.0).contains(&speed) => Ok(speed),
+        _ => Err("allowed: 0, or 0.001 to 1000".into()),
+    }
 }
 
 /// Arguments of `convert`.
@@ -143,7 +166,10 @@ pub fn run(command: &TraceCommand) -> Result<ExitCode, String> {
         TraceCommand::Stats(args) => stats(args),
         TraceCommand::Plot(args) => plot(args),
         TraceCommand::Check(args) => check(args),
-        TraceCommand::Replay(args) => replay(args),
+        TraceCommand::Replay(args) => match &args.bus {
+            None => replay(args),
+            Some(bus) => play(&args.file, bus, args.speed),
+        },
         TraceCommand::Convert(args) => convert(args),
     }
 }
@@ -255,6 +281,38 @@ fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
         "{} commands are the same, byte for byte\n",
         replay.compared()
     ))?;
+    source.verdict()
+}
+
+fn play(file: &Path, bus: &LinkAddress, speed: f64) -> Result<ExitCode, String> {
+    let mut source = Source::open(file)?;
+    let link = Link::open(bus).map_err(|error| error.to_string())?;
+    let mut player = Player::new(link, speed);
+    let failed = |error: PlayError| format!("{bus}: {error}");
+    if let LinkAddress::Slcan(SlcanPeer::Listen(_)) = bus {
+        eprintln!("plant-sim: waiting for a client on {bus}");
+        player.wait_for_client().map_err(failed)?;
+    }
+    let begun = Instant::now();
+    while let Some(record) = source.record()? {
+        player
+            .record(&record)
+            .map_err(|error| format!("{}: {}", source.place(), failed(error)))?;
+    }
+    let played = player.finish().map_err(failed)?;
+    show(&format!(
+        "{} frames played onto {bus} in {:.3} s; {} had to wait for a place in the queue, {} error frames left out\n",
+        played.frames,
+        begun.elapsed().as_secs_f64(),
+        played.waited,
+        played.left_out,
+    ))?;
+    if played.lost > 0 {
+        return Err(format!(
+            "{bus}: {} frames were refused or not read at the other end",
+            played.lost
+        ));
+    }
     source.verdict()
 }
 

@@ -15,6 +15,7 @@ pub mod convert;
 pub mod decode;
 pub mod fields;
 mod line;
+pub mod play;
 pub mod plot;
 mod reader;
 pub mod replay;

@@ -189,6 +189,17 @@ impl Link {
         }
     }
 
+    /// Bytes of frames taken by [`transmit`](Bus::transmit) that this process still holds; what is left when the link is
+    /// dropped is never sent. They go out while the link is waited for.
+    #[must_use]
+    pub fn unsent(&self) -> usize {
+        match self {
+            Self::SocketCan(_) => 0,
+            Self::Slcan(link) => link.unsent(),
+            Self::SlcanHub(link) => link.unsent(),
+        }
+    }
+
     fn take_failure(&mut self) -> Option<LinkError> {
         match self {
             Self::SocketCan(link) => link.failure.take(),

@@ -126,6 +126,10 @@ impl SlcanHub {
         self.clients.retain(|client| !client.gone);
     }
 
+    pub(super) fn unsent(&self) -> usize {
+        self.clients.iter().map(|client| client.output.len()).sum()
+    }
+
     pub(super) fn ready(&mut self, timeout: Duration) -> Result<bool, LinkError> {
         self.exchange();
         if self.received.is_empty() {

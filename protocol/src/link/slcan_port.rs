@@ -110,6 +110,10 @@ impl SlcanPort {
         self.refused
     }
 
+    pub(super) fn unsent(&self) -> usize {
+        self.output.len()
+    }
+
     pub(super) fn ready(&mut self, timeout: Duration) -> Result<bool, LinkError> {
         self.exchange();
         if !self.received.is_empty() {
