@@ -39,7 +39,15 @@ impl Body {
 
     /// Inertia matrix at the joints, rotors included, 4x4.
     pub fn mass_matrix(&self, trig: &Trig) -> Matrix4<f32> {
-        self.lagrange.mass_matrix(trig) + self.rotor
+        let mut mass = self.lagrange.mass_matrix(trig);
+        // Rotors couple lift and wrist, nothing else.
+        mass.m11 += self.rotor.m11;
+        mass.m22 += self.rotor.m22;
+        mass.m33 += self.rotor.m33;
+        mass.m34 += self.rotor.m34;
+        mass.m43 += self.rotor.m43;
+        mass.m44 += self.rotor.m44;
+        mass
     }
 
     /// Joint torque (N m, N m, N, N m) for a motion: links, rotors and friction.

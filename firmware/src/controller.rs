@@ -22,6 +22,7 @@ use crate::body::Body;
 use crate::kinematics::Trig;
 use crate::laws::{Gains, Memory, Selection, Situation};
 use crate::limits;
+use crate::math::clamp;
 use crate::mode::{self, Event};
 use crate::monitor::{Finding, Monitor, MonitorLimits};
 use crate::trajectory::Reference;
@@ -117,6 +118,8 @@ pub struct Controller {
     opening: u32,
     shutdown: Shutdown,
     queue: MoveQueue,
+    /// Planning steps a sample.
+    planning_steps: u8,
     /// The reference of the last sample, as handed to the law.
     reference: Reference,
     memory: Memory,
@@ -142,6 +145,7 @@ impl Controller {
             opening: 0,
             shutdown: Shutdown::Off,
             queue: MoveQueue::new(),
+            planning_steps: clamp(config.period * 4e3, 1.0, 40.0) as u8,
             reference: Reference::rest(Vector4::zeros()),
             memory: Memory::new(),
             monitor: Monitor::default(),
@@ -251,8 +255,8 @@ impl Controller {
         }
     }
 
-    /// One sample. Worst case: one trajectory evaluation, one control law,
-    /// [`crate::trajectory::planner::SAMPLES_PER_TICK`] planning samples.
+    /// One sample. Worst case: one trajectory evaluation and one control law. Planning is not part
+    /// of it: [`Controller::plan`] follows when the command is on its way.
     pub fn step(&mut self, readings: &Readings) -> Actions {
         let drive = &self.body.drive;
         let q = drive.joint_angle(&drive.motor_angle_of_counts(&readings.counts));
@@ -280,7 +284,6 @@ impl Controller {
                 torque: [0.0; 4],
             };
         }
-        self.plan();
         let reference = self.advance(readings.steps.min(MAX_GAP));
         let lead = self.config.command_delay + 0.5 * self.config.period;
         self.reference = reference;
@@ -437,15 +440,25 @@ impl Controller {
         }
     }
 
-    fn plan(&mut self) {
+    /// Plans on, for the time until the next sample: four steps for every millisecond of the
+    /// sampling period, at least one. Off the way from measurement to command, which it would
+    /// only make late.
+    pub fn plan(&mut self) {
+        if !self.is_holding() {
+            return;
+        }
         let capacity = Capacity {
             arm: &self.config.arm,
             body: &self.body,
         };
-        match self.queue.plan(&capacity) {
-            None => {}
-            Some((sequence, Ok(()))) => self.reply(sequence, Outcome::Accepted),
-            Some((sequence, Err(refusal))) => self.reply(sequence, Outcome::Refused(refusal)),
+        for _ in 0..self.planning_steps {
+            match self.queue.plan(&capacity) {
+                None => {}
+                Some((sequence, Ok(()))) => return self.reply(sequence, Outcome::Accepted),
+                Some((sequence, Err(refusal))) => {
+                    return self.reply(sequence, Outcome::Refused(refusal));
+                }
+            }
         }
     }
 

@@ -139,7 +139,10 @@ pub fn wrap(angle: f32) -> f32 {
 /// 17 u of rounding (two roundings a Horner step, numerator and denominator).
 #[must_use]
 pub fn tanh(x: f32) -> f32 {
-    let x = clamp(x, -8.0, 8.0);
+    // At any speed worth the name friction is fully built up.
+    if x.abs() >= 8.0 {
+        return 1.0_f32.copysign(x);
+    }
     let z = x * x;
     let p = 0.999_999_34 + z * (0.129_136_4 + z * (2.938_825_9e-3 + z * 1.131_020_8e-5));
     let q =

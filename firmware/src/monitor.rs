@@ -93,7 +93,8 @@ fn first_beyond(value: &Vector4<f32>, limit: &Vector4<f32>) -> Option<(Axis, f32
         .into_iter()
         .zip(value.iter())
         .zip(limit.iter())
-        .find(|((_, value), limit)| value.is_nan() || value.abs() > **limit)
+        // By their bits, magnitudes compare like integers, and a NaN is beyond every limit.
+        .find(|((_, value), limit)| value.abs().to_bits() > limit.to_bits())
         .map(|((axis, value), _)| (axis, *value))
 }
 

@@ -200,6 +200,7 @@ impl Node {
         let counter = self.counters.command;
         self.counters.command = counter.wrapping_add(1);
         self.send(&Message::Command(command), counter, bus);
+        self.controller.plan();
     }
 
     fn motion(&mut self, motion: &Motion, verdict: Verdict) {

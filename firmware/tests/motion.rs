@@ -54,12 +54,12 @@ fn plan(
         },
         from,
     )?;
-    for _ in 0..Planner::MAX_TICKS {
+    for _ in 0..Planner::MAX_STEPS {
         if let Some(result) = planner.work(&capacity) {
             return result;
         }
     }
-    panic!("not planned within {} ticks", Planner::MAX_TICKS)
+    panic!("not planned within {} steps", Planner::MAX_STEPS)
 }
 
 /// Walks a trajectory and holds every sample against every limit.

@@ -62,25 +62,41 @@ impl Capacity<'_> {
         let quadratic = body.mass_matrix(&trig) * qdd + body.lagrange.bias(&trig, qd);
         let linear = arm.drive.viscous.component_mul(qd);
         let constant = body.lagrange.gravity() + body.drive.friction(qd) - linear;
-        let joint = torque_scale(&quadratic, &linear, &constant, &self.torque())?;
         let drive = &body.drive;
-        let motor = torque_scale(
-            &drive.motor_torque(&quadratic),
-            &drive.motor_torque(&linear),
-            &drive.motor_torque(&constant),
-            &(arm.drive.motor_torque_limit * TORQUE_SHARE),
-        )?;
+        let joint_limit = self.torque();
+        let motor_limit = arm.drive.motor_torque_limit * TORQUE_SHARE;
+        let full = quadratic + linear + constant;
+        // Nearly every sample keeps its limits as it is and at rest: then there is nothing to solve.
+        let keeps = within(&full, &joint_limit)
+            && within(&constant, &joint_limit)
+            && within(&drive.motor_torque(&full), &motor_limit)
+            && within(&drive.motor_torque(&constant), &motor_limit);
+        let torque = if keeps {
+            1.0
+        } else {
+            let joint = torque_scale(&quadratic, &linear, &constant, &joint_limit)?;
+            let motor = torque_scale(
+                &drive.motor_torque(&quadratic),
+                &drive.motor_torque(&linear),
+                &drive.motor_torque(&constant),
+                &motor_limit,
+            )?;
+            joint.min(motor)
+        };
         let limits = &arm.limits;
-        let speed = ratio(&limits.velocity, qd)
-            .min(ratio(&arm.drive.motor_speed_limit, &drive.motor_speed(qd)));
-        let acceleration = ratio(&limits.acceleration, qdd);
-        let jerk = ratio(&limits.jerk, &reference.qddd);
-        let mut scale = joint.min(motor).min(speed * share);
-        if acceleration * share < 1.0 {
-            scale = scale.min(sqrt(acceleration * share));
+        let share = |limit: &Vector4<f32>| limit * share;
+        let speed = ratio(&share(&limits.velocity), qd).min(ratio(
+            &share(&arm.drive.motor_speed_limit),
+            &drive.motor_speed(qd),
+        ));
+        let acceleration = ratio(&share(&limits.acceleration), qdd);
+        let jerk = ratio(&share(&limits.jerk), &reference.qddd);
+        let mut scale = torque.min(speed);
+        if acceleration < 1.0 {
+            scale = scale.min(sqrt(acceleration));
         }
-        if jerk * share < 1.0 {
-            scale = scale.min(cbrt(jerk * share));
+        if jerk < 1.0 {
+            scale = scale.min(cbrt(jerk));
         }
         Ok(scale)
     }
@@ -128,13 +144,23 @@ impl Capacity<'_> {
     }
 }
 
-fn ratio(limit: &Vector4<f32>, value: &Vector4<f32>) -> f32 {
-    limit
+fn within(value: &Vector4<f32>, limit: &Vector4<f32>) -> bool {
+    value
         .iter()
-        .zip(value.iter())
-        .filter(|(_, value)| **value != 0.0)
-        .map(|(limit, value)| limit / value.abs())
-        .fold(1.0, f32::min)
+        .zip(limit.iter())
+        .all(|(value, limit)| value.abs() <= *limit)
+}
+
+/// Least of limit over value, where a value is larger than its limit; else at least 1.
+fn ratio(limit: &Vector4<f32>, value: &Vector4<f32>) -> f32 {
+    let mut least = 1.0f32;
+    for (limit, value) in limit.iter().zip(value.iter()) {
+        let value = value.abs();
+        if value * least > *limit {
+            least = limit / value;
+        }
+    }
+    least
 }
 
 fn torque_scale(
@@ -166,8 +192,7 @@ fn torque_scale(
     Ok(scale)
 }
 
-/// Largest `x` in 0..=1 such that `a y² + b y <= room` for all `y` in 0..=x; `None` where even
-/// rest is beyond the limit.
+/// Largest `x` in 0..=1 with `a x² + b x <= room`; `None` where even rest is beyond the limit.
 fn largest_scale(a: f32, b: f32, room: f32) -> Option<f32> {
     if room <= 0.0 {
         return None;

@@ -1,11 +1,11 @@
-//! From a request to a trajectory, a bounded piece of work a tick.
+//! From a request to a trajectory, one bounded step at a time.
 //!
 //! ```text
-//! Survey ---> Balance (x ROUNDS) ---> Verify ---> Trajectory
-//!   | reach,     | S-curve whose        | one time scale that
-//!   | limits,    | accelerations fill   | provably keeps every sample
-//!   | speeds     | the torque limits    | inside every limit
-//!   +------------+----------------------+---> Refusal (reason, axis, value, limit)
+//! Survey --> Stroke x 2 --> Compose --> Balance --> Compose --> Verify --> Trajectory
+//!   | reach,   (jumps:        ^           |           | one time scale that keeps
+//!   | limits,   the lift)     +-- rounds--+           | every sample inside every limit
+//!   | speeds                   S-curve whose accelerations fill the torque limits
+//!   +--------------------------------------> Refusal (reason, axis, value, limit)
 //! ```
 //!
 //! Constant joint acceleration limits would waste half of the robot: what bounds a SCARA is motor
@@ -26,16 +26,14 @@ use super::request::{Gate, Request, from_ik, from_path};
 use super::{Lift, Trajectory};
 use crate::arm::ArmModel;
 
-/// Samples of path or trajectory that one tick looks at: the bound on planning work per tick.
-pub const SAMPLES_PER_TICK: u8 = 2;
 /// Points of the survey of a line.
-const SURVEY_POINTS: u8 = 32;
+const SURVEY_POINTS: u8 = 24;
 /// Corrections of the two accelerations.
-const ROUNDS: u8 = 5;
+const ROUNDS: u8 = 4;
 /// Samples of each half of the profile in one round.
-const BALANCE_POINTS: u8 = 12;
+const BALANCE_POINTS: u8 = 8;
 /// Samples of the last pass.
-const VERIFY_POINTS: u8 = 96;
+const VERIFY_POINTS: u8 = 80;
 /// Share of the limits of speed, acceleration and jerk that the samples of a line may use.
 const LINE_SHARE: f32 = 0.9;
 /// A correction of an acceleration by more than this factor waits for the next round.
@@ -50,6 +48,14 @@ enum Stage {
     Survey {
         point: u8,
         fastest: Vector4<f32>,
+    },
+    /// One vertical stroke of a jump.
+    Stroke {
+        down: bool,
+    },
+    /// Profile from the bounds, after this many corrections.
+    Compose {
+        round: u8,
     },
     Balance {
         round: u8,
@@ -70,17 +76,21 @@ pub struct Planner {
     draft: Trajectory,
     bounds: Bounds,
     speed: f32,
-    /// Clearance and rises of a jump: up, down, clearance.
+    /// Heights of a jump.
     gate: Option<Gate>,
+    /// Time from the beginning of the descent until the clearance is reached, s.
+    blended: f32,
 }
 
 impl Planner {
     /// Calls of [`Planner::work`] after which a plan is complete or refused.
-    pub const MAX_TICKS: u32 = {
+    pub const MAX_STEPS: u32 = {
         let survey = SURVEY_POINTS as u32 + 1;
+        let strokes = 2;
+        let compose = ROUNDS as u32 + 1;
         let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
         let verify = VERIFY_POINTS as u32 + 1;
-        (survey + balance + verify).div_ceil(SAMPLES_PER_TICK as u32)
+        survey + strokes + compose + balance + verify
     };
 
     /// An idle planner.
@@ -109,6 +119,7 @@ impl Planner {
             },
             speed: 1.0,
             gate: None,
+            blended: 0.0,
         }
     }
 
@@ -168,33 +179,34 @@ impl Planner {
         Ok(())
     }
 
-    /// One tick of planning: at most [`SAMPLES_PER_TICK`] samples of the move. Returns the
-    /// trajectory or the refusal when the plan is complete.
+    /// One step of planning: one sample of the move, or one profile. Returns the trajectory or the
+    /// refusal when the plan is complete.
     pub fn work(&mut self, capacity: &Capacity<'_>) -> Option<Result<Trajectory, Refusal>> {
-        for _ in 0..SAMPLES_PER_TICK {
-            let done = match self.stage {
-                Stage::Idle => return None,
-                Stage::Survey { point, fastest } => self.survey(capacity, point, fastest),
-                Stage::Balance { round, point, gain } => self.balance(capacity, round, point, gain),
-                Stage::Verify {
-                    point,
-                    rate,
-                    before,
-                } => self.verify(capacity, point, rate, before),
-            };
-            match done {
-                Ok(None) => {}
-                Ok(Some(trajectory)) => {
-                    self.stage = Stage::Idle;
-                    return Some(Ok(trajectory));
-                }
-                Err(refusal) => {
-                    self.stage = Stage::Idle;
-                    return Some(Err(refusal));
-                }
+        let done = match self.stage {
+            Stage::Idle => return None,
+            Stage::Survey { point, fastest } => {
+                self.survey(capacity, point, fastest).map(|()| None)
             }
-        }
-        None
+            Stage::Stroke { down } => {
+                self.stroke(capacity, down);
+                Ok(None)
+            }
+            Stage::Compose { round } => {
+                self.compose(round);
+                Ok(None)
+            }
+            Stage::Balance { round, point, gain } => {
+                self.balance(capacity, round, point, gain).map(|()| None)
+            }
+            Stage::Verify {
+                point,
+                rate,
+                before,
+            } => self.verify(capacity, point, rate, before),
+        };
+        let result = done.transpose()?;
+        self.stage = Stage::Idle;
+        Some(result)
     }
 
     /// Reach, limits and the largest joint travel per unit of path.
@@ -203,7 +215,7 @@ impl Planner {
         capacity: &Capacity<'_>,
         point: u8,
         fastest: Vector4<f32>,
-    ) -> Result<Option<Trajectory>, Refusal> {
+    ) -> Result<(), Refusal> {
         let s = f32::from(point) / f32::from(SURVEY_POINTS);
         let here = self.point(capacity.arm, s)?;
         check_limits(capacity.arm, &here.q).map_err(from_ik)?;
@@ -215,7 +227,7 @@ impl Planner {
                 point: point + 1,
                 fastest,
             };
-            return Ok(None);
+            return Ok(());
         }
         let limits = &capacity.arm.limits;
         let fill = |limit: &Vector4<f32>| {
@@ -239,21 +251,12 @@ impl Planner {
                 jerk: fill(&limits.jerk),
             };
         }
-        self.compose(capacity);
-        self.stage = if self.bounds.speed > 0.0 {
-            Stage::Balance {
-                round: 0,
-                point: 0,
-                gain: [STEP; 2],
-            }
+        self.stage = if self.gate.is_some() {
+            Stage::Stroke { down: false }
         } else {
-            Stage::Verify {
-                point: 0,
-                rate: 1.0,
-                before: None,
-            }
+            Stage::Compose { round: 0 }
         };
-        Ok(None)
+        Ok(())
     }
 
     /// One sample of one half; at the end of a round, new accelerations.
@@ -263,7 +266,7 @@ impl Planner {
         round: u8,
         point: u8,
         gain: [f32; 2],
-    ) -> Result<Option<Trajectory>, Refusal> {
+    ) -> Result<(), Refusal> {
         let profile = &self.draft.profile;
         let braking = point >= BALANCE_POINTS;
         let share = (f32::from(point % BALANCE_POINTS) + 0.5) / f32::from(BALANCE_POINTS);
@@ -287,28 +290,15 @@ impl Planner {
                 point: point + 1,
                 gain: [speeding_gain, braking_gain],
             };
-            return Ok(None);
+            return Ok(());
         }
         let (up, down) = profile.peaks();
         let ceiling = self.acceleration_ceiling(capacity.arm);
         let correct = |peak: f32, gain: f32| (peak * gain.max(1.0 / STEP)).min(ceiling);
         self.bounds.accelerate = correct(up, speeding_gain);
         self.bounds.brake = correct(down, braking_gain);
-        self.compose(capacity);
-        self.stage = if round + 1 < ROUNDS {
-            Stage::Balance {
-                round: round + 1,
-                point: 0,
-                gain: [STEP; 2],
-            }
-        } else {
-            Stage::Verify {
-                point: 0,
-                rate: 1.0,
-                before: None,
-            }
-        };
-        Ok(None)
+        self.stage = Stage::Compose { round: round + 1 };
+        Ok(())
     }
 
     /// One sample of the whole move; at the end, the trajectory. `before` is the acceleration of
@@ -368,37 +358,57 @@ impl Planner {
         }
     }
 
-    /// Profiles from the bounds, and for a jump how they lie over each other in time.
-    fn compose(&mut self, capacity: &Capacity<'_>) {
-        self.draft.profile = if self.bounds.speed > 0.0 {
-            SCurve::new(1.0, &self.bounds)
-        } else {
-            SCurve::default()
-        };
-        let across = self.draft.profile.duration();
-        let Some(gate) = self.gate else {
-            self.draft.start = 0.0;
-            self.draft.span = across;
+    /// The profile of one vertical stroke, and when it passes the clearance.
+    fn stroke(&mut self, capacity: &Capacity<'_>, down: bool) {
+        let (Some(gate), Path::Joint { start, .. }) = (self.gate, &self.draft.path) else {
+            self.stage = Stage::Compose { round: 0 };
             return;
         };
-        let from = match self.draft.path {
-            Path::Joint { start, .. } => start.z,
-            Path::Line { .. } => 0.0,
-        };
         let (up_bounds, down_bounds) = capacity.lift(gate.rise.max(gate.fall));
-        let up = stroke(gate.rise, &up_bounds);
-        let down = stroke(gate.fall, &down_bounds);
-        let start = up.time_at(gate.clearance.min(gate.rise));
-        let blended = down.time_at(gate.fall - gate.clearance.min(gate.fall));
-        let down_start = (start + across - blended).max(up.duration());
-        self.draft.start = start;
-        self.draft.span = down_start + down.duration();
-        self.draft.lift = Some(Lift {
-            from,
-            up,
-            down,
-            down_start,
+        let lift = self.draft.lift.get_or_insert(Lift {
+            from: start.z,
+            up: SCurve::default(),
+            down: SCurve::default(),
+            down_start: 0.0,
         });
+        self.stage = if down {
+            lift.down = stroke(gate.fall, &down_bounds);
+            self.blended = lift.down.time_at(gate.fall - gate.clearance.min(gate.fall));
+            Stage::Compose { round: 0 }
+        } else {
+            lift.up = stroke(gate.rise, &up_bounds);
+            self.draft.start = lift.up.time_at(gate.clearance.min(gate.rise));
+            Stage::Stroke { down: true }
+        };
+    }
+
+    /// Profile from the bounds, and how the strokes of a jump lie over it in time.
+    fn compose(&mut self, round: u8) {
+        let travels = self.bounds.speed > 0.0;
+        if travels {
+            self.draft.profile = SCurve::new(1.0, &self.bounds);
+        }
+        let arrival = self.draft.start + self.draft.profile.duration();
+        self.draft.span = match &mut self.draft.lift {
+            None => arrival,
+            Some(lift) => {
+                lift.down_start = (arrival - self.blended).max(lift.up.duration());
+                lift.down_start + lift.down.duration()
+            }
+        };
+        self.stage = if travels && round < ROUNDS {
+            Stage::Balance {
+                round,
+                point: 0,
+                gain: [STEP; 2],
+            }
+        } else {
+            Stage::Verify {
+                point: 0,
+                rate: 1.0,
+                before: None,
+            }
+        };
     }
 }
 

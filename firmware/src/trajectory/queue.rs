@@ -100,7 +100,7 @@ impl MoveQueue {
         self.plan_end = *q;
     }
 
-    /// One tick of planning. Returns the number of a request and its answer, when it has one.
+    /// One step of planning. Returns the number of a request and its answer, when it has one.
     pub fn plan(&mut self, capacity: &Capacity<'_>) -> Option<(u8, Result<(), Refusal>)> {
         if self.planner.is_idle() {
             if self.moves.is_full() {
