@@ -5,7 +5,7 @@
 //! see, and the results are timed as on a wire even where the link is a virtual one.
 //!
 //! - *Lock-step*: the plant waits for the answer. The controller counts time in samples
-//!   ([`SampleClock`](firmware::sample_clock::SampleClock)), so a twin of it in this process, fed with the same frames,
+//!   ([`SampleClock`]), so a twin of it in this process, fed with the same frames,
 //!   must send the same frames; each is compared byte for byte.
 //! - *Real time*: samples are taken at absolute deadlines of the machine's clock. A command that is late acts late.
 

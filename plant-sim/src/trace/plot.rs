@@ -1,6 +1,6 @@
 //! A picture of a trace: set and actual joint positions, tracking errors, torques, modes and faults over time.
 //!
-//! Memory is bounded: every curve keeps the envelope of its values in a fixed number of bins (see [`series`]), so an
+//! Memory is bounded: every curve keeps the envelope of its values in a fixed number of bins (see `series`), so an
 //! hour takes as much as a second, and no peak is lost.
 
 mod series;
