@@ -367,10 +367,11 @@ impl Node {
     }
 
     fn send<B: Bus>(&mut self, message: &Message, counter: u8, bus: &mut B) {
+        // By reference: to move a frame out of its result is to copy it.
         let sent = codec::encode(message, counter)
-            .ok()
-            .and_then(|frame| bus.transmit(&frame).ok());
-        if sent.is_none() {
+            .as_ref()
+            .is_ok_and(|frame| bus.transmit(frame).is_ok());
+        if !sent {
             self.rejections.unsent = self.rejections.unsent.saturating_add(1);
         }
     }

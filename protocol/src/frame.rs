@@ -100,6 +100,29 @@ impl CanFrame {
         Self::with_data(id.into(), FrameKind::Fd { brs, esi: false }, data)
     }
 
+    /// The encoder's frame: the first `len` bytes of a buffer that is zero beyond them. `None` if the format has no such
+    /// length.
+    pub(crate) fn filled(
+        id: StandardId,
+        kind: FrameKind,
+        len: usize,
+        buffer: &[u8; FD_MAX],
+    ) -> Option<Self> {
+        let longest = match kind {
+            FrameKind::Classical { .. } => CLASSICAL_MAX,
+            FrameKind::Fd { .. } => FD_MAX,
+        };
+        if len > longest || fd_length(len) != Some(len) {
+            return None;
+        }
+        Some(Self {
+            id: id.into(),
+            kind,
+            len: len as u8,
+            buffer: *buffer,
+        })
+    }
+
     /// The same frame with this error state indicator. A classical frame has none and stays as it is.
     #[must_use]
     pub fn with_esi(mut self, passive: bool) -> Self {

@@ -28,6 +28,7 @@ pub mod frame;
 #[cfg(feature = "std")]
 pub mod link;
 pub mod messages;
+mod packed;
 pub mod schema;
 mod signals;
 pub mod slcan;

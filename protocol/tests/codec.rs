@@ -13,7 +13,7 @@ use protocol::counters::Counters;
 use protocol::e2e::{Profile, Verdict};
 use protocol::frame::{CanFrame, ExtendedId, StandardId};
 use protocol::messages::*;
-use protocol::schema::{Content, MessageInfo};
+use protocol::schema::{Content, Kind, MessageInfo};
 use protocol::table::{self, TABLE};
 
 fn frame_of(id: u16, fd: bool, data: &[u8]) -> CanFrame {
@@ -96,6 +96,32 @@ proptest! {
         }
     }
 
+    /// The messages of every sample are not written again after reading: what is accepted must have one form without it.
+    #[test]
+    fn what_is_received_every_sample_has_one_form(
+        k in 0..2usize, noise in prop::collection::vec(any::<u8>(), 48), place: prop::sample::Index,
+    ) {
+        let info = [&table::FEEDBACK, &table::COMMAND][k];
+        let mut body = noise[..info.body_len()].to_vec();
+        // Small exponents and no reserved bit, so that most are accepted; then every value of one byte.
+        body[4] &= 0x0F;
+        for signal in info.signals.iter().filter(|signal| matches!(signal.kind, Kind::F32 { .. })) {
+            body[signal.offset..signal.end()].chunks_mut(4).for_each(|float| float[3] &= 0xBF);
+        }
+        let place = place.index(body.len());
+        let mut accepted = 0;
+        for byte in 0..=255 {
+            body[place] = byte;
+            let frame = protected(info, &body);
+            if let Ok(Received { message, counter }) = codec::decode(&frame) {
+                accepted += 1;
+                prop_assert_eq!(codec::encode(&message, counter.unwrap()), Ok(frame));
+            }
+        }
+        // The sets have bits to spare, and floats exponents.
+        prop_assert!(accepted >= 16, "{} accepted", accepted);
+    }
+
     #[test]
     fn random_frames_do_no_harm(id in 0..0x800u16, fd: bool, data in prop::collection::vec(any::<u8>(), 0..=64)) {
         let data = if fd { &data[..] } else { &data[..data.len().min(8)] };
@@ -112,6 +138,43 @@ proptest! {
             data[bit / 8] ^= 1 << (bit % 8);
         }
         prop_assert_eq!(codec::decode(&frame_of(0x1C0, true, &data)), Err(DecodeError::Crc));
+    }
+}
+
+/// Every element of the floats of every sample, on and next to the limits of the table.
+#[test]
+fn the_range_of_every_sample_is_that_of_the_table() {
+    for info in [&table::FEEDBACK, &table::COMMAND] {
+        for signal in info.signals {
+            let Kind::F32 { min, max } = signal.kind else {
+                continue;
+            };
+            for (k, &(element, _)) in signal.elements.iter().enumerate() {
+                let result = |value: f32| {
+                    let mut body = vec![0; info.body_len()];
+                    body[signal.offset + 4 * k..][..4].copy_from_slice(&value.to_le_bytes());
+                    codec::decode(&protected(info, &body)).map(|_| ())
+                };
+                for value in [min, -0.0, f32::MIN_POSITIVE, max] {
+                    assert_eq!(result(value), Ok(()));
+                }
+                let signal = signal.name;
+                for value in [min.next_down(), max.next_up(), f32::MIN, f32::MAX] {
+                    let error = ValueError::OutOfRange {
+                        signal,
+                        element,
+                        value,
+                        min,
+                        max,
+                    };
+                    assert_eq!(result(value), Err(DecodeError::Value(error)));
+                }
+                for value in [f32::NEG_INFINITY, f32::INFINITY, f32::NAN, -f32::NAN] {
+                    let error = ValueError::NotFinite { signal, element };
+                    assert_eq!(result(value), Err(DecodeError::Value(error)));
+                }
+            }
+        }
     }
 }
 

@@ -16,6 +16,10 @@ fn crcs_are_those_of_the_catalogue() {
     assert_eq!(Crc::<u8>::new(&CRC_8_AUTOSAR).checksum(check), 0xDF);
     assert_eq!(bitwise_crc(16, 0x1021, 0xFFFF, 0x0000, check), 0x29B1);
     assert_eq!(bitwise_crc(8, 0x2F, 0xFF, 0xFF, check), 0xDF);
+    // The same text as a frame: data id "12", payload "345678", counter "9".
+    let mut frame = *b"345678???";
+    Profile::Fd.protect(0x3132, b'9', &mut frame);
+    assert_eq!(frame, *b"3456789\x29\xB1");
 }
 
 #[test]

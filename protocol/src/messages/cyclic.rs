@@ -6,21 +6,18 @@ use super::{Cause, Compensation, Law, Mode};
 use crate::codes::bits;
 
 /// Drives to controller, every sample: state of the motors at the sampling instant.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Feedback {
     /// Number of the sample, counting up and wrapping.
-    #[serde(with = "postcard::fixint::le")]
     pub sample: u32,
     /// What the drives report about themselves.
     pub status: DriveStatus,
     /// Multi-turn encoder position, counts, per motor.
-    #[serde(with = "packed_i32")]
     pub position: [i32; 4],
     /// Shaft speed, rad/s, per motor.
     pub velocity: [f32; 4],
     /// Torque per thousand of rated torque, averaged over the sample just ended, per motor (CiA 402 object 6077h).
-    #[serde(with = "packed_i16")]
     pub torque: [i16; 4],
 }
 
@@ -45,11 +42,10 @@ bits! {
 }
 
 /// Controller to drives, every sample: applied when it arrives.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Command {
     /// Sample of the feedback that this answers.
-    #[serde(with = "postcard::fixint::le")]
     pub sample: u32,
     /// What the drives shall switch.
     pub control: ControlWord,
@@ -135,29 +131,3 @@ bits! {
         PREDICTED = 13, "predicted";
     }
 }
-
-/// Fixed-width integers in arrays, which postcard's `fixint` does not reach: packed little-endian.
-macro_rules! packed {
-    ($module:ident, $int:ident) => {
-        mod $module {
-            use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-            pub fn serialize<S: Serializer>(
-                values: &[$int; 4],
-                serializer: S,
-            ) -> Result<S::Ok, S::Error> {
-                values.map($int::to_le_bytes).serialize(serializer)
-            }
-
-            pub fn deserialize<'de, D: Deserializer<'de>>(
-                deserializer: D,
-            ) -> Result<[$int; 4], D::Error> {
-                <[[u8; size_of::<$int>()]; 4]>::deserialize(deserializer)
-                    .map(|values| values.map($int::from_le_bytes))
-            }
-        }
-    };
-}
-
-packed!(packed_i32, i32);
-packed!(packed_i16, i16);

@@ -1,0 +1,143 @@
+//! The two messages of every sample, packed by hand: field after field, little-endian, without padding.
+//!
+//! The codec runs both once a sample and spends no time on what cannot be: here every bit belongs to a field and every
+//! field is taken as it stands, so two different bodies never read as one message, and what was read need not be written
+//! again to know that it has no other form. The floats are four of one kind, held against one limit.
+
+use crate::messages::{Command, ControlWord, DriveStatus, Feedback};
+use crate::schema::{Kind, MessageInfo};
+use crate::table;
+
+/// A message of a fixed number of bytes.
+pub(crate) trait Packed<const LEN: usize>: Sized {
+    /// The message in these bytes, or `None` if a field has no such value.
+    fn unpack(body: &[u8; LEN]) -> Option<Self>;
+
+    /// Fills the bytes; `None` if there are less than the fields take, which the tests of the layout rule out.
+    fn pack(&self, body: &mut [u8; LEN]) -> Option<()>;
+
+    /// Whether all floats are finite and in the range that the table gives them.
+    fn in_range(&self) -> bool;
+}
+
+const FEEDBACK_LEN: usize = 45;
+const COMMAND_LEN: usize = 21;
+
+// No padding: the fields fill the body.
+const _: () = assert!(FEEDBACK_LEN == table::FEEDBACK.body_len());
+const _: () = assert!(COMMAND_LEN == table::COMMAND.body_len());
+
+const VELOCITY_MAX: f32 = magnitude(&table::FEEDBACK);
+const TORQUE_MAX: f32 = magnitude(&table::COMMAND);
+
+/// Greatest magnitude of the floats of a message that has one signal of them, with a symmetric range.
+const fn magnitude(info: &MessageInfo) -> f32 {
+    let (mut found, mut greatest) = (0, 0.0);
+    let mut signals = info.signals;
+    while let [signal, rest @ ..] = signals {
+        if let Kind::F32 { min, max } = signal.kind {
+            assert!(min == -max);
+            (found, greatest) = (found + 1, max);
+        }
+        signals = rest;
+    }
+    assert!(found == 1);
+    greatest
+}
+
+fn all_within(values: &[f32; 4], max: f32) -> bool {
+    // Comparison with a NaN is false.
+    values.iter().all(|value| value.abs() <= max)
+}
+
+impl Packed<FEEDBACK_LEN> for Feedback {
+    fn unpack(body: &[u8; FEEDBACK_LEN]) -> Option<Self> {
+        let mut fields = Fields(body);
+        let feedback = Self {
+            sample: fields.one(u32::from_le_bytes)?,
+            status: DriveStatus::from_bits(fields.one(u8::from_le_bytes)?)?,
+            position: fields.four(i32::from_le_bytes)?,
+            velocity: fields.four(f32::from_le_bytes)?,
+            torque: fields.four(i16::from_le_bytes)?,
+        };
+        fields.0.is_empty().then_some(feedback)
+    }
+
+    fn pack(&self, body: &mut [u8; FEEDBACK_LEN]) -> Option<()> {
+        let mut room = Room(body);
+        room.one(self.sample.to_le_bytes())?;
+        room.one(self.status.bits().to_le_bytes())?;
+        room.four(self.position.map(i32::to_le_bytes))?;
+        room.four(self.velocity.map(f32::to_le_bytes))?;
+        room.four(self.torque.map(i16::to_le_bytes))?;
+        room.0.is_empty().then_some(())
+    }
+
+    fn in_range(&self) -> bool {
+        all_within(&self.velocity, VELOCITY_MAX)
+    }
+}
+
+impl Packed<COMMAND_LEN> for Command {
+    fn unpack(body: &[u8; COMMAND_LEN]) -> Option<Self> {
+        let mut fields = Fields(body);
+        let command = Self {
+            sample: fields.one(u32::from_le_bytes)?,
+            control: ControlWord::from_bits(fields.one(u8::from_le_bytes)?)?,
+            torque: fields.four(f32::from_le_bytes)?,
+        };
+        fields.0.is_empty().then_some(command)
+    }
+
+    fn pack(&self, body: &mut [u8; COMMAND_LEN]) -> Option<()> {
+        let mut room = Room(body);
+        room.one(self.sample.to_le_bytes())?;
+        room.one(self.control.bits().to_le_bytes())?;
+        room.four(self.torque.map(f32::to_le_bytes))?;
+        room.0.is_empty().then_some(())
+    }
+
+    fn in_range(&self) -> bool {
+        all_within(&self.torque, TORQUE_MAX)
+    }
+}
+
+/// What is left to read. Lengths are constants where this is used: the checks are decided by the compiler.
+struct Fields<'a>(&'a [u8]);
+
+impl Fields<'_> {
+    #[inline(always)]
+    fn one<const N: usize, T>(&mut self, from: impl Fn([u8; N]) -> T) -> Option<T> {
+        let (field, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(from(*field))
+    }
+
+    #[inline(always)]
+    fn four<const N: usize, T>(&mut self, from: impl Fn([u8; N]) -> T) -> Option<[T; 4]> {
+        Some([
+            self.one(&from)?,
+            self.one(&from)?,
+            self.one(&from)?,
+            self.one(&from)?,
+        ])
+    }
+}
+
+/// What is left to write.
+struct Room<'a>(&'a mut [u8]);
+
+impl Room<'_> {
+    #[inline(always)]
+    fn one<const N: usize>(&mut self, field: [u8; N]) -> Option<()> {
+        let (place, rest) = core::mem::take(&mut self.0).split_first_chunk_mut()?;
+        *place = field;
+        self.0 = rest;
+        Some(())
+    }
+
+    #[inline(always)]
+    fn four<const N: usize>(&mut self, fields: [[u8; N]; 4]) -> Option<()> {
+        fields.into_iter().try_for_each(|field| self.one(field))
+    }
+}
