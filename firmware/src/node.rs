@@ -7,6 +7,7 @@
 use nalgebra::Vector4;
 use protocol::bus::Bus;
 use protocol::codec::{self, DecodeError};
+use protocol::counters::Counters;
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::messages::{
     Cause, Command, Emergency, Feedback, Heartbeat, Hello, LimitFlags, Message, Motion,
@@ -31,35 +32,9 @@ const HEARTBEAT_PERIOD_US: u64 = 100_000;
 /// Rejected, stale or duplicate feedback frames in a row that stop the arm.
 const MAX_BAD_FEEDBACK: u8 = 3;
 
-/// What a node has refused, by cause; every counter saturates.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Rejections {
-    /// Frames that are no message of ours or fail a check.
-    pub undecodable: u16,
-    /// Frames whose end-to-end CRC is wrong.
-    pub corrupted: u16,
-    /// Frames seen before.
-    pub duplicate: u16,
-    /// Frames older than what has been seen.
-    pub stale: u16,
-    /// Frames lost, from gaps in the counters.
-    pub lost: u16,
-    /// Frames that could not be sent.
-    pub unsent: u16,
-}
-
-impl Rejections {
-    fn total(&self) -> u16 {
-        self.undecodable
-            .saturating_add(self.corrupted)
-            .saturating_add(self.duplicate)
-            .saturating_add(self.stale)
-    }
-}
-
 /// Transmit counters, one an identifier.
 #[derive(Clone, Copy, Debug, Default)]
-struct Counters {
+struct Sequence {
     command: u8,
     reply: u8,
     state: u8,
@@ -75,8 +50,9 @@ pub struct Node {
     feedback: Receiver,
     motion: Receiver,
     parameter: Receiver,
-    counters: Counters,
-    rejections: Rejections,
+    sequence: Sequence,
+    received: Counters,
+    unsent: u16,
     bad_feedback: u8,
     /// Sample number and arrival of the newest feedback.
     newest: Option<(u32, u64)>,
@@ -97,8 +73,9 @@ impl Node {
             feedback: Receiver::new(Profile::Fd),
             motion: Receiver::new(Profile::Fd),
             parameter: Receiver::new(Profile::Fd),
-            counters: Counters::default(),
-            rejections: Rejections::default(),
+            sequence: Sequence::default(),
+            received: Counters::default(),
+            unsent: 0,
             bad_feedback: 0,
             newest: None,
             same_schema: false,
@@ -113,9 +90,14 @@ impl Node {
         &self.controller
     }
 
-    /// What was refused so far.
-    pub fn rejections(&self) -> &Rejections {
-        &self.rejections
+    /// Frames received and not used so far, by cause.
+    pub fn received(&self) -> &Counters {
+        &self.received
+    }
+
+    /// Frames that could not be sent so far.
+    pub fn unsent(&self) -> u16 {
+        self.unsent
     }
 
     /// A shell reports a tick that ended after its deadline.
@@ -197,8 +179,8 @@ impl Node {
             control: actions.control,
             torque: actions.torque,
         };
-        let counter = self.counters.command;
-        self.counters.command = counter.wrapping_add(1);
+        let counter = self.sequence.command;
+        self.sequence.command = counter.wrapping_add(1);
         self.send(&Message::Command(command), counter, bus);
         self.controller.plan();
     }
@@ -240,8 +222,8 @@ impl Node {
                 limit: 0.0,
             },
         };
-        let counter = self.counters.parameter;
-        self.counters.parameter = counter.wrapping_add(1);
+        let counter = self.sequence.parameter;
+        self.sequence.parameter = counter.wrapping_add(1);
         self.send(
             &Message::ParameterReply(Server::Controller, reply),
             counter,
@@ -251,32 +233,16 @@ impl Node {
 
     /// Counts what the counter says was lost, repeated or late; `true` for a frame to act on.
     fn admit(&mut self, verdict: Verdict) -> bool {
-        let counter = match verdict {
-            Verdict::Initial | Verdict::Fresh => return true,
-            Verdict::Lost(frames) => {
-                self.rejections.lost = self.rejections.lost.saturating_add(u16::from(frames));
-                return true;
-            }
-            Verdict::Duplicate => &mut self.rejections.duplicate,
-            Verdict::Stale(_) => &mut self.rejections.stale,
-        };
-        *counter = counter.saturating_add(1);
-        false
+        self.received.judge(verdict);
+        !matches!(verdict, Verdict::Duplicate | Verdict::Stale(_))
     }
 
     fn reject(&mut self, error: DecodeError, frame: &protocol::frame::CanFrame) {
-        let corrupted = error == DecodeError::Crc;
-        let counter = if corrupted {
-            &mut self.rejections.corrupted
-        } else {
-            &mut self.rejections.undecodable
-        };
-        *counter = counter.saturating_add(1);
+        self.received.refuse(&error);
         if !frame.is_extended() && frame.raw_id() == u32::from(protocol::table::FEEDBACK.id) {
-            self.suspect(if corrupted {
-                Cause::Corrupted
-            } else {
-                Cause::BadValue
+            self.suspect(match error {
+                DecodeError::Crc => Cause::Corrupted,
+                _ => Cause::BadValue,
             });
         }
     }
@@ -305,19 +271,14 @@ impl Node {
     /// What is due: replies, an emergency, state and heartbeat.
     fn report<B: Bus>(&mut self, now: u64, bus: &mut B) {
         while let Some(reply) = self.controller.take_reply() {
-            let counter = self.counters.reply;
-            self.counters.reply = counter.wrapping_add(1);
+            let counter = self.sequence.reply;
+            self.sequence.reply = counter.wrapping_add(1);
             self.send(&Message::MotionReply(reply), counter, bus);
         }
         if let Some(alarm) = self.controller.take_alarm() {
-            let emergency = Emergency {
-                code: emergency_code(alarm.cause),
-                register: 1,
-                cause: alarm.cause,
-                data: alarm.value.to_bits(),
-            };
-            let counter = self.counters.emergency;
-            self.counters.emergency = counter.wrapping_add(1);
+            let emergency = Emergency::new(alarm.cause, alarm.value.to_bits());
+            let counter = self.sequence.emergency;
+            self.sequence.emergency = counter.wrapping_add(1);
             self.send(
                 &Message::Emergency(Name::Controller, emergency),
                 counter,
@@ -327,8 +288,8 @@ impl Node {
         if now >= self.next_state {
             self.next_state = now + STATE_PERIOD_US;
             let state = self.state();
-            let counter = self.counters.state;
-            self.counters.state = counter.wrapping_add(1);
+            let counter = self.sequence.state;
+            self.sequence.state = counter.wrapping_add(1);
             self.send(&Message::State(state), counter, bus);
         }
         if now >= self.next_heartbeat {
@@ -338,8 +299,8 @@ impl Node {
                 cause: self.controller.cause(),
                 reset: ResetReason::PowerOn,
             };
-            let counter = self.counters.heartbeat;
-            self.counters.heartbeat = counter.wrapping_add(1);
+            let counter = self.sequence.heartbeat;
+            self.sequence.heartbeat = counter.wrapping_add(1);
             self.send(
                 &Message::Heartbeat(Name::Controller, heartbeat),
                 counter,
@@ -358,7 +319,7 @@ impl Node {
             queue: controller.queued(),
             completed: controller.completed(),
             overruns: self.overruns,
-            rejected: self.rejections.total(),
+            rejected: self.received.dropped(),
             worst_tick: 0,
             law: selection.law,
             compensation: selection.compensation,
@@ -372,28 +333,10 @@ impl Node {
             .as_ref()
             .is_ok_and(|frame| bus.transmit(frame).is_ok());
         if !sent {
-            self.rejections.unsent = self.rejections.unsent.saturating_add(1);
+            self.unsent = self.unsent.saturating_add(1);
         }
     }
 }
 
 /// Identifies the build in the handshake.
 const BUILD: u32 = 1;
-
-/// Emergency error code, CiA 301 table 26 and CiA 402 table 1.
-fn emergency_code(cause: Cause) -> u16 {
-    match cause {
-        Cause::None => 0x0000,
-        Cause::OverTorque => 0x8331,
-        Cause::FollowingError => 0x8611,
-        Cause::OverSpeed => 0x8481,
-        Cause::SoftLimit => 0x8500,
-        Cause::FeedbackLost | Cause::PeerSilent => 0x8130,
-        Cause::Reordered | Cause::Corrupted | Cause::BadValue => 0x8200,
-        Cause::BusOff => 0x8140,
-        Cause::DriveFault | Cause::StuckSensor => 0x7300,
-        Cause::Overrun | Cause::SelfTest | Cause::SchemaMismatch => 0x6100,
-        Cause::DuplicateNode | Cause::Babbling => 0x8100,
-        Cause::EStop => 0x9000,
-    }
-}

@@ -363,10 +363,13 @@ fn a_silent_peer_takes_the_torque_away_and_is_reported() {
         (bench.mode(), bench.node.controller().cause()),
         (Mode::Fault, Cause::PeerSilent)
     );
-    assert!(
-        sent.iter()
-            .any(|m| matches!(m, Message::Emergency(_, e) if e.cause == Cause::PeerSilent))
-    );
+    let emergency = sent.iter().find_map(|m| match m {
+        Message::Emergency(_, emergency) => Some(emergency),
+        _ => None,
+    });
+    // CiA 301: 8130h is a failed heartbeat; register bits 0 (generic) and 4 (communication).
+    let told = emergency.map(|e| (e.cause, e.code, e.register));
+    assert_eq!(told, Some((Cause::PeerSilent, 0x8130, 0x11)));
     assert!(is_off(&bench.command()));
 }
 
@@ -432,7 +435,7 @@ fn three_bad_feedback_frames_in_a_row_stop_the_arm() {
         bench.poll();
         assert_eq!(bench.mode(), expected, "{count}");
     }
-    assert_eq!(bench.node.rejections().corrupted, 3);
+    assert_eq!(bench.node.received().crc, 3);
     assert_eq!(bench.node.controller().cause(), Cause::Corrupted);
 }
 

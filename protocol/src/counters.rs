@@ -1,5 +1,7 @@
 //! Received frames that were not used, counted by cause.
 
+use core::fmt;
+
 use crate::codec::{DecodeError, ValueError};
 use crate::e2e::Verdict;
 
@@ -74,5 +76,33 @@ impl Counters {
         ]
         .into_iter()
         .fold(0, u16::saturating_add)
+    }
+}
+
+/// The causes that occurred: `3 with a wrong CRC, 1 stale`, or `none`.
+impl fmt::Display for Counters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let causes = [
+            (self.unknown_id, "of unknown identifier"),
+            (self.wrong_kind, "of the wrong format"),
+            (self.wrong_length, "of the wrong length"),
+            (self.crc, "with a wrong CRC"),
+            (self.malformed, "malformed"),
+            (self.not_canonical, "not canonical"),
+            (self.not_finite, "not finite"),
+            (self.out_of_range, "out of range"),
+            (self.duplicate, "duplicate"),
+            (self.stale, "stale"),
+            (self.lost, "lost"),
+        ];
+        let mut separator = "";
+        for (count, cause) in causes.into_iter().filter(|(count, _)| *count > 0) {
+            write!(f, "{separator}{count} {cause}")?;
+            separator = ", ";
+        }
+        if separator.is_empty() {
+            f.write_str("none")?;
+        }
+        Ok(())
     }
 }

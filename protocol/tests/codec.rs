@@ -433,6 +433,7 @@ fn every_cause_is_counted_once() {
         }),
     ];
     let mut counters = Counters::default();
+    assert_eq!(counters.to_string(), "none");
     for error in &errors {
         counters.refuse(error);
     }
@@ -456,6 +457,11 @@ fn every_cause_is_counted_once() {
     };
     assert_eq!(counters, one_each);
     assert_eq!(counters.dropped(), errors.len() as u16 + 2);
+    assert_eq!(
+        counters.to_string(),
+        "1 of unknown identifier, 1 of the wrong format, 1 of the wrong length, 1 with a wrong CRC, 1 malformed, \
+         1 not canonical, 1 not finite, 1 out of range, 1 duplicate, 1 stale, 5 lost"
+    );
     for _ in 0..=u16::MAX {
         counters.refuse(&DecodeError::Crc);
     }

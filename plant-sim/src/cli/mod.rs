@@ -3,6 +3,7 @@
 mod cost;
 mod dbc;
 mod eval;
+mod model;
 mod monitor;
 mod run;
 mod timing;
@@ -41,6 +42,8 @@ enum Command {
     Monitor(monitor::MonitorArgs),
     /// Write the messages of the link as a DBC file.
     Dbc(dbc::DbcArgs),
+    /// Write a robot as an external controller takes it (controller --model).
+    Model(model::ModelArgs),
 }
 
 /// Does what the command line says. An error is one message for the person who typed it.
@@ -55,6 +58,7 @@ pub fn main() -> Result<ExitCode, String> {
         Some(Command::Trace(command)) => trace::run(&command),
         Some(Command::Monitor(args)) => monitor::run(&args),
         Some(Command::Dbc(args)) => dbc::run(&args),
+        Some(Command::Model(args)) => model::run(&args),
     }
 }
 

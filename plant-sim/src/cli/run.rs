@@ -60,7 +60,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// The robot that the controller believes in (a model file); also the true one, unless
-    /// --plant-model says otherwise.
+    /// --plant-model says otherwise. An external controller is told the same: plant-sim model FILE.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// The robot as it is (a model file).
@@ -186,22 +186,19 @@ enum Place<'a> {
     RealTime(&'a LinkAddress),
 }
 
-/// Puts together what belongs together: a link and an external controller need each other, and an
-/// external controller brings its own model of the robot.
+/// Puts together what belongs together: a link and an external controller need each other.
 fn place(args: &RunArgs) -> Result<Place<'_>, String> {
     if args.listen.is_some() && !matches!(args.controller, ControllerChoice::InProcess) {
         return Err("--listen shows the built-in bus of a controller in this process; the bus of an external one can be watched itself".into());
     }
     match (args.controller, &args.bus) {
-        (ControllerChoice::External, BusChoice::Link(_)) if args.model.is_some() => Err(
-            "--model is what the controller believes, and an external one has its own; use --plant-model".into(),
-        ),
         (ControllerChoice::External, BusChoice::Link(bus)) if args.real_time => {
             Ok(Place::RealTime(bus))
         }
         (ControllerChoice::External, BusChoice::Link(bus)) => Ok(Place::LockStep(bus)),
         (ControllerChoice::External, BusChoice::Builtin) => Err(
-            "--controller external needs a bus that leads to it, such as --bus socketcan:vcan0".into(),
+            "--controller external needs a bus that leads to it, such as --bus socketcan:vcan0"
+                .into(),
         ),
         (_, BusChoice::Link(bus)) => Err(format!(
             "--bus {bus} leads to an external controller: add --controller external, and start it with: controller --bus {bus}"

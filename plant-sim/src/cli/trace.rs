@@ -124,7 +124,7 @@ pub struct ReplayArgs {
     #[arg(long, value_name = "BUS")]
     bus: Option<LinkAddress>,
     /// How many times as fast as recorded; 0: as fast as the bus takes the frames.
-    #[arg(long, value_name = "X", default_value_t = 1.0, requires = "bus", value_parser = speed)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, requires = "bus", allow_negative_numbers = true, value_parser = speed)]
     speed: f64,
 }
 

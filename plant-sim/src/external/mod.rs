@@ -150,8 +150,8 @@ impl LockStep {
             if expected != Some(*frame) {
                 let difference = first_difference(expected.as_ref(), frame);
                 return Err(self.remote.error(format!(
-                    "differs from its twin in this process {}: {difference}. Both must be built from one source; a \
-                     controller in real time needs a plant in real time (--real-time)",
+                    "differs from its twin in this process {}: {difference}. Both must be built from one source and \
+                     told one robot (--model); a controller in real time needs a plant in real time (--real-time)",
                     self.place()
                 )));
             }

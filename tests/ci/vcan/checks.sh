@@ -30,7 +30,8 @@ frames() { awk '{print $3}' "$1" | sed -E 's/##[45]/##1/' | grep -v '^000#' | so
 # --- lock-step, the controller first, every frame captured
 controller
 await controller.err "waiting for the drives"
-candump -L vcan0 >capture.log & capture=$!
+# With room for every frame: a lock-step run is faster than a program that writes lines.
+candump -L -r 67108864 vcan0 >capture.log & capture=$!
 until_true "candump listening" sockets 2
 plant --cycles 2 --out first >first.txt 2>first.err || fail "lock-step run"
 sleep 1

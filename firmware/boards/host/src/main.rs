@@ -5,12 +5,14 @@
 mod clock;
 mod shell;
 
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Parser;
-use firmware::arm::IRB_930;
+use firmware::arm::{ArmModel, IRB_930};
 use firmware::controller::Config;
 use protocol::link::{Link, LinkAddress, realtime};
 
@@ -31,6 +33,9 @@ struct Args {
     /// time is counted in samples, for a plant that waits for each command (lock-step).
     #[arg(long)]
     real_time: bool,
+    /// The robot, as `plant-sim model` writes it; otherwise an IRB 930-22/1.05.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -44,6 +49,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), String> {
+    let arm = args.model.as_deref().map_or(Ok(IRB_930), load)?;
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
@@ -58,8 +64,19 @@ fn run(args: &Args) -> Result<(), String> {
     } else {
         Clock::lock_step(period_ns as u64)
     };
-    let config = Config::new(IRB_930, (period_ns * 1e-9) as f32);
+    let config = Config::new(arm, (period_ns * 1e-9) as f32);
     Shell::new(link, args.bus.to_string(), config, clock)
         .run(&stop)
         .map_err(|error| error.to_string())
+}
+
+/// The robot of a file, if the controller can work with it.
+fn load(path: &Path) -> Result<ArmModel, String> {
+    let name = path.display();
+    let text = fs::read_to_string(path).map_err(|error| format!("cannot read {name}: {error}"))?;
+    let arm: ArmModel = serde_json::from_str(&text).map_err(|error| {
+        format!("{name} is no robot of a controller: {error}; write one with: plant-sim model FILE")
+    })?;
+    arm.validate().map_err(|error| format!("{name}: {error}"))?;
+    Ok(arm)
 }

@@ -97,11 +97,12 @@ impl Shell {
             self.report_silence();
         }
         eprintln!(
-            "controller: stopped in {} after {} samples, {} answered late; rejected: {}",
+            "controller: stopped in {} after {} samples, {} answered late; frames not used: {}; not sent: {}",
             self.mode,
             self.counts.feedback,
             self.counts.late,
-            rejections(&self.node),
+            self.node.received(),
+            self.node.unsent(),
         );
         Ok(())
     }
@@ -210,19 +211,6 @@ fn is_reset(frame: &CanFrame) -> bool {
         return false;
     };
     nmt.command == NmtCommand::ResetNode && (nmt.node == 0 || nmt.node == Name::Controller.code())
-}
-
-fn rejections(node: &Node) -> String {
-    let counts = node.rejections();
-    format!(
-        "{} undecodable, {} corrupted, {} duplicate, {} stale; {} lost, {} unsent",
-        counts.undecodable,
-        counts.corrupted,
-        counts.duplicate,
-        counts.stale,
-        counts.lost,
-        counts.unsent
-    )
 }
 
 /// The bus as the node sees it in one call: at most the frame that is due.

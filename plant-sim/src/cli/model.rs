@@ -1,0 +1,37 @@
+//! `plant-sim model`: a robot for a controller in a process of its own.
+//!
+//! Model files are read and checked here alone. The controller takes what comes out: its own numbers, in its own
+//! precision, which read back bit by bit.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use firmware::arm::ArmModel;
+
+use super::run::load;
+use super::show;
+
+/// Arguments of `model`.
+#[derive(Args)]
+pub struct ModelArgs {
+    /// The robot (a model file); otherwise the built-in IRB 930-22/1.05.
+    file: Option<PathBuf>,
+    /// Write to this file instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Writes the robot as JSON.
+pub fn run(args: &ModelArgs) -> Result<ExitCode, String> {
+    let arm = ArmModel::from(&load(args.file.as_ref())?);
+    arm.validate()
+        .map_err(|error| format!("the controller cannot work with this robot: {error}"))?;
+    let text = serde_json::to_string_pretty(&arm).map_err(|error| error.to_string())? + "\n";
+    match &args.out {
+        Some(path) => std::fs::write(path, text)
+            .map_err(|error| format!("cannot write {}: {error}", path.display()))?,
+        None => show(&text)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,264 @@
+"""peers.py BIN WORK: the checks of 12-peers.sh, on a machine with vcan0.
+
+Frames are compared completely, except for when they came: nothing depends on how fast the machine is. A virtual bus takes
+frames faster than programs read them, so whoever receives gets room for all of them.
+"""
+
+import fcntl
+import os
+import pty
+import random
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import termios
+import threading
+import time
+
+import can
+import pyte
+
+BIN, WORK = sys.argv[1:]
+PLANT_SIM, CONTROLLER, TRACE = f"{BIN}/plant-sim", f"{BIN}/controller", f"{WORK}/run/trace.log"
+LIMIT = 60  # seconds; reached only when something fails
+ROOM = 64 << 20  # bytes
+SO_RCVBUFFORCE = 33
+SEED = 1
+FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
+
+
+def main():
+    trace = read_log(TRACE)
+    assert len(trace) > 1000
+    mixed = f"{WORK}/mixed.log"
+    with can.CanutilsLogWriter(mixed) as log:
+        for message in random_messages(random.Random(SEED), 500):
+            log.on_message_received(message)
+    canplayer_to_ours(trace)
+    for log in (TRACE, mixed):
+        ours_to_candump_and_python_can(log)
+    python_can_to_ours(trace)
+    cansend_to_ours()
+    slcand_to_ours_and_back()
+
+
+def canplayer_to_ours(trace):
+    with Monitor() as monitor, Candump("vcan0", "canplayer.log", len(trace)) as candump:
+        subprocess.run(["canplayer", "-I", TRACE, "vcan0=can0"], check=True)
+        assert candump.frames() == trace, "candump saw other frames of canplayer than the trace holds"
+        monitor.expect(trace)
+    print(f"ok: canplayer plays our trace, monitor and candump receive its {len(trace)} frames")
+
+
+def ours_to_candump_and_python_can(log):
+    frames = read_log(log)
+    with python_can() as bus, Candump("vcan0", "replay.log", len(frames)) as candump:
+        subprocess.run(
+            [PLANT_SIM, "trace", "replay", log, "--bus", "socketcan:vcan0", "--speed", "0"], check=True, stdout=subprocess.DEVNULL
+        )
+        assert candump.frames() == frames, f"candump saw other frames than {log} holds"
+        heard = [frame_of(bus.recv(LIMIT)) for _ in frames]
+        assert heard == frames, f"python-can saw other frames than {log} holds"
+    print(f"ok: trace replay plays {len(frames)} frames, candump and python-can receive the same")
+
+
+def python_can_to_ours(trace):
+    with Monitor() as monitor, python_can() as bus, Candump("vcan0", "python.log", len(trace)) as candump:
+        for index, message in enumerate(can.CanutilsLogReader(TRACE)):
+            bus.send(message)
+            if index % 50 == 49:
+                time.sleep(0.01)  # the monitor's socket has room for some 200 frames
+        assert candump.frames() == trace, "candump saw other frames of python-can than the trace holds"
+        monitor.expect(trace)
+    print(f"ok: python-can sends {len(trace)} frames, the monitor counts them, none bad, none lost")
+
+
+def cansend_to_ours():
+    with Controller("socketcan:vcan0") as controller, Candump("vcan0", "controller.log") as candump:
+        controller.await_line("waiting for the drives")
+        cansend("vcan0", "000#8141")  # network management: reset node 0x41
+        controller.await_line("reset by network management")
+        cansend("vcan0", "001#")  # emergency stop, empty
+        controller.await_line("controller: estop")
+        # CiA 301 puts the emergency error code first, low byte first; 9000h is an external error.
+        candump.await_frame(lambda frame: frame[0] == 0x0C1 and frame[-1][:2] == b"\x00\x90")
+    print("ok: cansend resets and stops the controller, candump sees its emergency")
+
+
+def slcand_to_ours_and_back():
+    """The kernel's serial-line driver on one end of a pair of terminals, we on the other. It knows classical frames only."""
+    pair = subprocess.Popen(["socat", "pty,raw,echo=0,link=/dev/ttyPeer", f"pty,raw,echo=0,link={WORK}/tty"])
+    await_true("two terminals", lambda: os.path.exists("/dev/ttyPeer") and os.path.exists(f"{WORK}/tty"))
+    slcand = subprocess.Popen(["slcand", "-F", "-o", "-s8", "ttyPeer", "slcan0"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        await_true("slcan0", lambda: os.path.exists("/sys/class/net/slcan0"))
+        subprocess.run(["ip", "link", "set", "slcan0", "up"], check=True)
+        log = f"{WORK}/classical.log"
+        with can.CanutilsLogWriter(log) as writer:
+            for message in random_messages(random.Random(SEED), 500):
+                if not message.is_fd:
+                    writer.on_message_received(message)
+        frames = read_log(log)
+        with Candump("slcan0", "slcan.log", len(frames)) as candump:
+            subprocess.run(
+                [PLANT_SIM, "trace", "replay", log, "--bus", f"slcan:{WORK}/tty", "--speed", "0"], check=True, stdout=subprocess.DEVNULL
+            )
+            assert candump.frames() == frames, "slcan0 saw other frames than we played"
+        with Controller(f"slcan:{WORK}/tty") as controller:
+            controller.await_line("waiting for the drives")
+            cansend("slcan0", "000#8141")
+            controller.await_line("reset by network management")
+    finally:
+        slcand.terminate()
+        pair.terminate()
+    print(f"ok: slcand receives {len(frames)} classical frames of ours, and we its")
+
+
+class Candump:
+    """candump -L into a file; with `count`, the test waits for that many frames."""
+
+    def __init__(self, interface, name, count=0):
+        self.interface, self.path, self.count = interface, f"{WORK}/{name}", count
+
+    def __enter__(self):
+        before = sockets(self.interface)
+        self.file = open(self.path, "w")
+        self.process = subprocess.Popen(["candump", "-L", "-r", str(ROOM), self.interface], stdout=self.file)
+        await_true("candump", lambda: sockets(self.interface) > before)
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.process.wait()
+        self.file.close()
+
+    def frames(self):
+        await_true(f"{self.count} frames in {self.path}", lambda: lines(self.path) >= self.count)
+        return read_log(self.path)
+
+    def await_frame(self, wanted):
+        await_true("the frame", lambda: any(map(wanted, read_log(self.path))))
+
+
+class Controller:
+    def __init__(self, bus):
+        self.bus, self.path = bus, f"{WORK}/controller.err"
+
+    def __enter__(self):
+        self.file = open(self.path, "w")
+        self.process = subprocess.Popen([CONTROLLER, "--bus", self.bus], stderr=self.file)
+        return self
+
+    def __exit__(self, failed, *_):
+        self.process.send_signal(signal.SIGINT)
+        status = self.process.wait()
+        self.file.close()
+        assert failed or status == 0, f"Ctrl-C did not end the controller cleanly: {status}"
+
+    def await_line(self, text):
+        await_true(f"controller: {text!r}", lambda: text in open(self.path).read())
+
+
+class Monitor:
+    """plant-sim monitor on a terminal of its own."""
+
+    def __init__(self):
+        self.screen = pyte.Screen(160, 50)
+
+    def __enter__(self):
+        before = sockets("vcan0")
+        pid, self.terminal = pty.fork()
+        if pid == 0:
+            # The size is asked for once, at the start.
+            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 50, 160, 0, 0))
+            os.environ["TERM"] = "xterm-256color"
+            os.execv(PLANT_SIM, [PLANT_SIM, "monitor", "--bus", "socketcan:vcan0"])
+        self.pid = pid
+        self.reader = threading.Thread(target=self.read, daemon=True)
+        self.reader.start()
+        await_true("monitor", lambda: sockets("vcan0") > before)
+        return self
+
+    def read(self):
+        stream = pyte.ByteStream(self.screen)
+        while True:
+            try:
+                data = os.read(self.terminal, 65536)
+            except OSError:  # a terminal whose other end has closed
+                return
+            if not data:
+                return
+            stream.feed(data)
+
+    def __exit__(self, *_):
+        os.write(self.terminal, b"q")
+        _, status = os.waitpid(self.pid, 0)
+        assert status == 0, f"monitor ended with {status}"
+
+    def expect(self, frames):
+        """All frames counted, and on every identifier none lost and none bad: the checksums are right."""
+        await_true(f"monitor: {len(frames)} frames", lambda: f" {len(frames)} frames" in self.screen.display[0])
+        rows = {}
+        for line in self.screen.display:
+            words = line.strip("│ ").split()
+            if len(words) > 6 and words[0] in ("1C0", "240", "300", "641", "5C1", "741"):
+                rows[words[0]] = words[5:7]
+        assert len(rows) == 6 and all(row == ["0", "0"] for row in rows.values()), rows
+
+
+def python_can():
+    bus = can.Bus(interface="socketcan", channel="vcan0", fd=True)
+    bus.socket.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, ROOM)
+    return bus
+
+
+def cansend(interface, frame):
+    subprocess.run(["cansend", interface, frame], check=True)
+
+
+def sockets(interface):
+    """Programs that receive from the interface."""
+    return sum(line.split()[0] == interface for line in open("/proc/net/can/rcvlist_all") if line.strip())
+
+
+def lines(path):
+    return open(path, "rb").read().count(b"\n")
+
+
+def await_true(what, condition):
+    end = time.monotonic() + LIMIT
+    while not condition():
+        assert time.monotonic() < end, f"{what} did not come"
+        time.sleep(0.05)
+
+
+def frame_of(message):
+    return (
+        message.arbitration_id, message.is_extended_id, message.is_remote_frame, message.is_fd, message.bitrate_switch,
+        message.error_state_indicator, bytes(message.data),
+    )
+
+
+def read_log(path):
+    return [frame_of(message) for message in can.CanutilsLogReader(path)]
+
+
+def random_messages(rng, count):
+    for index in range(count):
+        extended, kind = rng.random() < 0.4, rng.choice(["data", "remote", "fd", "fd"])
+        identifier = rng.randrange(1 << 29 if extended else 1 << 11)
+        data = b"" if kind == "remote" else rng.randbytes(rng.choice(FD_LENGTHS if kind == "fd" else FD_LENGTHS[:9]))
+        yield can.Message(
+            timestamp=index / 1000, channel="can0", arbitration_id=identifier, is_extended_id=extended,
+            is_remote_frame=kind == "remote", is_fd=kind == "fd", bitrate_switch=kind == "fd" and rng.random() < 0.5,
+            error_state_indicator=kind == "fd" and rng.random() < 0.5, data=data,
+        )
+
+
+try:
+    main()
+except AssertionError as failure:
+    print(f"FAIL: {failure}")
+    sys.exit(1)
