@@ -3,6 +3,7 @@
 mod board;
 mod difference;
 mod image;
+mod serial;
 
 use std::cell::RefCell;
 use std::path::PathBuf;
@@ -10,7 +11,9 @@ use std::rc::Rc;
 
 use firmware::controller::Config;
 use firmware::node::Node;
-use mps2_an386::Request;
+use firmware::sample_clock::SampleClock;
+pub use mps2_an386::Channel;
+use mps2_an386::{Request, Setup};
 use protocol::frame::CanFrame;
 
 use crate::endpoint::{Endpoint, EndpointError, InProcess};
@@ -21,7 +24,10 @@ use board::Board;
 pub struct Options {
     /// The image; `None` builds it from the sources.
     pub image: Option<PathBuf>,
-    /// Count instructions: the emulated clock then moves by instructions and by nothing else. Slower.
+    /// How frames travel between the rig and the board.
+    pub channel: Channel,
+    /// Count instructions: the emulated clock then moves by instructions and by nothing else. Slower, and
+    /// over the FIFOs only.
     pub count: Option<Rc<RefCell<Measured>>>,
 }
 
@@ -51,6 +57,8 @@ pub struct Qemu {
     twin: InProcess,
     expected: Vec<CanFrame>,
     board: Board,
+    /// Time on the UART: that of the drives' samples, since slcan carries no other.
+    clock: Option<SampleClock>,
     count: Option<Rc<RefCell<Measured>>>,
 }
 
@@ -64,10 +72,15 @@ impl Qemu {
             Some(image) => image.clone(),
             None => image::build()?,
         };
+        let setup = Setup {
+            channel: options.channel,
+            config,
+        };
         Ok(Self {
             twin: InProcess::new(config),
             expected: Vec::new(),
-            board: Board::start(&image, &config, options.count.is_some())?,
+            board: Board::start(&image, &setup, options.count.is_some())?,
+            clock: (setup.channel == Channel::Uart).then(|| SampleClock::new(setup.period_ns())),
             count: options.count.clone(),
         })
     }
@@ -81,11 +94,21 @@ impl Endpoint for Qemu {
         sent: &mut Vec<CanFrame>,
     ) -> Result<(), EndpointError> {
         let first = sent.len();
-        let request = Request::Poll {
-            now,
-            frame: received.copied(),
+        let mut now = now;
+        let ticks = match (&mut self.clock, received) {
+            (None, _) => {
+                let frame = received.copied();
+                self.board.ask(&Request::Poll { now, frame }, sent)?
+            }
+            (Some(clock), Some(frame)) => {
+                clock.observe(frame);
+                now = clock.now();
+                self.board.exchange(frame, sent)?;
+                0
+            }
+            // Without a frame there is nothing that the UART could tell the board.
+            (Some(_), None) => return Ok(()),
         };
-        let ticks = self.board.ask(&request, sent)?;
         let planning = self.twin.node().controller().is_planning();
         self.expected.clear();
         self.twin.poll(now, received, &mut self.expected)?;
@@ -108,8 +131,13 @@ impl Endpoint for Qemu {
 }
 
 impl Drop for Qemu {
-    /// The board is asked for its stack at the very end, when the deepest path has been taken.
+    /// What the board can tell only at the very end: bytes lost, and the stack when the deepest path has been taken.
     fn drop(&mut self) {
+        if self.clock.is_some()
+            && let Ok(lost @ 1..) = self.board.close_bus()
+        {
+            eprintln!("plant-sim: the controller in QEMU has lost {lost} bytes on its UART");
+        }
         if let Some(count) = &self.count
             && let Ok(stack) = self.board.ask(&Request::Stack, &mut Vec::new())
         {

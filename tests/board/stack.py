@@ -2,14 +2,17 @@
 
     tests/board/stack.py IMAGE [ROOT]
 
-Sound while every call is direct and no function calls itself; both are checked. Exceptions come on top: none returns
-in these images.
+Sound while every call is direct and no function calls itself; both are checked. One interrupt comes on top: all have
+the same priority, so none interrupts another. Faults do not return, and what they would overwrite is of no use any more.
 """
 
 import re
 import subprocess
 import sys
 
+INTERRUPTS = ("DefaultHandler", "SysTick")
+# What the core stacks on entry with the FPU in use: 26 words, and one to align (Armv7-M, B1.5.7).
+EXCEPTION_FRAME = 4 * (26 + 1)
 FUNCTION = re.compile(r"^[0-9a-f]{8} <(.+)>:$")
 INSTRUCTION = re.compile(r"^\s*[0-9a-f]+:\t(\S+)\s*(.*)$")
 TARGET = re.compile(r"<([^>+]+)(\+0x[0-9a-f]+)?>")
@@ -77,7 +80,8 @@ def main():
     image, root = sys.argv[1], (sys.argv[2:] or ["Reset"])[0]
     frames, calls, indirect = read(image)
     depth, chain = deepest(root, frames, calls)
-    reached, waiting = set(), [root]
+    interrupt, handler = max(deepest(name, frames, calls) for name in INTERRUPTS if name in frames)
+    reached, waiting = set(), [root, *INTERRUPTS]
     while waiting:
         name = waiting.pop()
         if name not in reached:
@@ -85,8 +89,8 @@ def main():
             waiting.extend(calls.get(name, ()))
     if blind := reached & indirect:
         sys.exit(f"stack.py: calls through a register in {', '.join(sorted(blind))}")
-    print(depth)
-    for name in chain:
+    print(depth + EXCEPTION_FRAME + interrupt)
+    for name in (*chain, *handler):
         short = subprocess.run(["arm-none-eabi-c++filt", name], capture_output=True, text=True).stdout.strip()
         print(f"{frames[name]:6} {short}", file=sys.stderr)
 

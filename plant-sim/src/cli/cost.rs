@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 use clap::Args;
 use plant_sim::model::RobotModel;
-use plant_sim::qemu::{Measured, Options, Poll, Qemu};
+use plant_sim::qemu::{Channel, Measured, Options, Poll, Qemu};
 use plant_sim::run::{self, RunConfig};
 use plant_sim::scenario::Scenario;
 use plant_sim::selection::LawChoice;
@@ -50,6 +50,7 @@ pub fn run(args: &CostArgs) -> Result<ExitCode, String> {
     let measured = Rc::new(RefCell::new(Measured::default()));
     let options = Options {
         image: args.image.clone(),
+        channel: Channel::Fifo,
         count: Some(Rc::clone(&measured)),
     };
     let summary = run::execute_with(&config, None, |config| Qemu::start(config, &options))

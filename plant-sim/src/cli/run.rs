@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use plant_sim::endpoint::InProcess;
 use plant_sim::external::{LockStep, RealTime, Watched};
 use plant_sim::model::RobotModel;
-use plant_sim::qemu::{self, Qemu};
+use plant_sim::qemu::{self, Channel, Qemu};
 use plant_sim::run::{self, RunConfig, Summary};
 use plant_sim::scenario::{self, Scenario};
 use plant_sim::selection::LawChoice;
@@ -52,6 +52,9 @@ pub struct RunArgs {
     /// The image for --controller qemu, instead of the one built from the sources.
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
+    /// How frames get to the controller in QEMU: in records, fast, or as slcan over its UART.
+    #[arg(long, value_name = "CHANNEL", default_value = "fifo")]
+    channel: ChannelChoice,
     /// Show the built-in bus to CAN tools: they connect to slcan:tcp:HOST:PORT and take it for an
     /// adapter. The run waits for the first and goes at the speed of the clock.
     #[arg(long, value_name = "slcan:tcp:HOST:PORT")]
@@ -79,6 +82,12 @@ enum ControllerChoice {
     InProcess,
     Qemu,
     External,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum ChannelChoice {
+    Fifo,
+    Uart,
 }
 
 #[derive(Clone)]
@@ -143,6 +152,10 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
         Place::Qemu => {
             let options = qemu::Options {
                 image: args.image.clone(),
+                channel: match args.channel {
+                    ChannelChoice::Fifo => Channel::Fifo,
+                    ChannelChoice::Uart => Channel::Uart,
+                },
                 count: None,
             };
             run::execute_with(&config, Some(&args.out), |config| {
@@ -190,6 +203,9 @@ enum Place<'a> {
 fn place(args: &RunArgs) -> Result<Place<'_>, String> {
     if args.listen.is_some() && !matches!(args.controller, ControllerChoice::InProcess) {
         return Err("--listen shows the built-in bus of a controller in this process; the bus of an external one can be watched itself".into());
+    }
+    if args.channel != ChannelChoice::Fifo && !matches!(args.controller, ControllerChoice::Qemu) {
+        return Err("--channel needs --controller qemu".into());
     }
     match (args.controller, &args.bus) {
         (ControllerChoice::External, BusChoice::Link(bus)) if args.real_time => {

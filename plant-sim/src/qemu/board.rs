@@ -1,10 +1,12 @@
 //! The emulator as a child process, and the channel to it.
 //!
 //! It ends with this process, however that ends: the channel is closed by then, and the board ends the emulation when it
-//! reads the end of it. A thread watches over a child that does not get that far.
+//! reads the end of it, or, on its UART, when nothing has come for 20 s. A thread watches over a child that does not get
+//! that far.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
@@ -12,15 +14,15 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use firmware::controller::Config;
 use mps2_an386::{
-    FRAME_LEN, FROM_BOARD, REPLY_HEADER, Request, TO_BOARD, config_to_bytes, frame_from_bytes,
+    Channel, FRAME_LEN, FROM_BOARD, REPLY_HEADER, Request, Setup, TO_BOARD, frame_from_bytes,
     reply_header,
 };
 use protocol::frame::CanFrame;
 use rustix::fs::{CWD, FileType, Mode, OFlags, mknodat};
 
 use super::failure;
+use super::serial::Serial;
 use crate::endpoint::EndpointError;
 
 const EMULATOR: &str = "qemu-system-arm";
@@ -42,12 +44,17 @@ pub fn instructions(ticks: u32) -> u32 {
     (u64::from(ticks) * TICK_NS).div_ceil(1 << ICOUNT_SHIFT) as u32
 }
 
+/// Name of the socket that is the other end of UART 0.
+const UART: &str = "uart";
+
 /// A running board.
 #[derive(Debug)]
 pub struct Board {
     /// `None` once the channel is closed.
     requests: Option<File>,
     replies: BufReader<File>,
+    /// What the frames travel on, unless it is the FIFOs.
+    serial: Option<Serial<UnixStream>>,
     watch: Arc<Watch>,
     watcher: Option<JoinHandle<Ended>>,
 }
@@ -69,12 +76,13 @@ enum Ended {
 
 impl Board {
     /// Starts the emulator; `count` makes its clock that of instructions.
-    pub fn start(image: &Path, config: &Config, count: bool) -> Result<Self, EndpointError> {
+    pub fn start(image: &Path, setup: &Setup, count: bool) -> Result<Self, EndpointError> {
         if !image.is_file() {
             return Err(failure(format!("has no image at {}", image.display())));
         }
         let image = fs::canonicalize(image).map_err(|error| unusable(image, &error))?;
-        let config = config_to_bytes(config)
+        let record = setup
+            .to_bytes()
             .ok_or_else(|| failure("cannot be configured: the record is too short"))?;
         let place = Place::new()?;
         let requests = place.fifo(TO_BOARD, OFlags::RDWR)?;
@@ -87,7 +95,7 @@ impl Board {
         command
             .current_dir(&place.0)
             .args(["-machine", "mps2-an386", "-display", "none"])
-            .args(["-serial", "none", "-monitor", "none"])
+            .args(["-monitor", "none"])
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-kernel")
             .arg(&image)
@@ -97,6 +105,22 @@ impl Board {
         if count {
             command.args(["-icount", &format!("shift={ICOUNT_SHIFT}")]);
         }
+        let socket = match setup.channel {
+            Channel::Fifo => {
+                command.args(["-serial", "none"]);
+                None
+            }
+            Channel::Uart => {
+                let path = place.0.join(UART);
+                let socket = UnixListener::bind(&path).map_err(|error| unusable(&path, &error))?;
+                // The emulator moves bytes of a multiplexed device in larger pieces; -echr takes its escape character
+                // out of the range of bytes.
+                command
+                    .args(["-chardev", &format!("socket,id=uart,path={UART},mux=on")])
+                    .args(["-serial", "chardev:uart", "-echr", "0x100"]);
+                Some(socket)
+            }
+        };
         let child = command.spawn().map_err(|error| {
             failure(if error.kind() == io::ErrorKind::NotFound {
                 format!("needs {EMULATOR}; install it: apt-get install qemu-system-arm")
@@ -110,13 +134,47 @@ impl Board {
         let mut board = Self {
             requests: Some(requests),
             replies: BufReader::new(replies),
+            serial: None,
             watch,
             watcher: Some(watcher),
         };
-        board.say(&config)?;
-        // The first answer tells that the board has opened both ends: their names may go.
-        board.ask(&Request::Stack, &mut Vec::new())?;
+        board.say(&record)?;
+        // The first answer tells that both ends are open, and the socket since before the board started: their names may
+        // go.
+        board.wait(|board| listen(&mut board.replies, &mut Vec::new()))?;
+        if let Some(socket) = socket {
+            let (line, _) = socket
+                .accept()
+                .map_err(|error| failure(format!("has no UART: {error}")))?;
+            board.serial = Some(Serial::new(line));
+            board.serial(Serial::open)?;
+        }
         Ok(board)
+    }
+
+    /// Hands a frame over on the UART, and appends what comes back to `sent`.
+    pub fn exchange(
+        &mut self,
+        frame: &CanFrame,
+        sent: &mut Vec<CanFrame>,
+    ) -> Result<(), EndpointError> {
+        self.serial(|serial| serial.exchange(frame, sent))
+    }
+
+    /// Closes the bus on the UART; returns how many bytes the board's receiver has lost.
+    pub fn close_bus(&mut self) -> Result<u32, EndpointError> {
+        self.serial(Serial::close)?;
+        self.wait(|board| listen(&mut board.replies, &mut Vec::new()))
+    }
+
+    fn serial<T>(
+        &mut self,
+        what: impl FnOnce(&mut Serial<UnixStream>) -> io::Result<T>,
+    ) -> Result<T, EndpointError> {
+        self.wait(|board| match &mut board.serial {
+            Some(serial) => what(serial),
+            None => Err(io::ErrorKind::NotConnected.into()),
+        })
     }
 
     /// Asks and waits for the answer: appends its frames to `sent` and returns its number.
@@ -126,8 +184,16 @@ impl Board {
         sent: &mut Vec<CanFrame>,
     ) -> Result<u32, EndpointError> {
         self.say(&request.to_bytes())?;
+        self.wait(|board| listen(&mut board.replies, sent))
+    }
+
+    /// Waits for the board, under the eyes of the watching thread.
+    fn wait<T>(
+        &mut self,
+        what: impl FnOnce(&mut Self) -> io::Result<T>,
+    ) -> Result<T, EndpointError> {
         self.watch.waiting.store(true, Ordering::Relaxed);
-        let answer = listen(&mut self.replies, sent);
+        let answer = what(self);
         self.watch.waiting.store(false, Ordering::Relaxed);
         self.watch.answers.fetch_add(1, Ordering::Relaxed);
         answer.map_err(|error| self.ended(&error))
@@ -144,6 +210,9 @@ impl Board {
 
     /// Why there is no answer.
     fn ended(&mut self, error: &io::Error) -> EndpointError {
+        if error.kind() == io::ErrorKind::InvalidData {
+            return failure(format!("does not speak our language: {error}"));
+        }
         match self.close() {
             Some(Ended::Hung) => failure("did not answer for 20 s"),
             Some(Ended::ByItself(Ok(status), stderr)) => failure(format!(

@@ -1,17 +1,17 @@
-//! The image: asks the host for the configuration, then polls the node whenever the host says so.
+//! The image: asks the host for configuration and channel, then runs the node on that channel.
 
+mod adapter;
 mod host;
 mod panic;
 mod stack;
+mod uart;
 
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use firmware::controller::Config;
 use firmware::node::Node;
-use mps2_an386::{
-    CONFIG_LEN, FROM_BOARD, REQUEST_LEN, Reply, Request, TO_BOARD, config_from_bytes,
-};
+use mps2_an386::{Channel, FROM_BOARD, REQUEST_LEN, Reply, Request, SETUP_LEN, Setup, TO_BOARD};
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
 
@@ -23,34 +23,42 @@ const SYST_MAX: u32 = 0x00FF_FFFF;
 #[entry]
 fn main() -> ! {
     // Static, so that the stack holds calls only. The attribute hands these out once, as references.
-    static mut CONFIG: Option<Config> = None;
+    static mut SETUP: Option<Setup> = None;
     static mut NODE: Option<Node> = None;
     static mut REPLY: Reply = Reply::new();
-    host::exit(start(CONFIG, NODE, REPLY))
+    host::exit(start(SETUP, NODE, REPLY))
 }
 
-fn start(
-    config: &mut Option<Config>,
-    node: &mut Option<Node>,
-    reply: &mut Reply,
-) -> Result<(), End> {
-    if let Some(mut core) = cortex_m::Peripherals::take() {
-        start_timer(&mut core.SYST);
-    }
+fn start(setup: &mut Option<Setup>, node: &mut Option<Node>, reply: &mut Reply) -> Result<(), End> {
+    let mut core = cortex_m::Peripherals::take().ok_or(End)?;
+    start_timer(&mut core.SYST);
     let input = File::open(TO_BOARD)?;
     let output = File::create(FROM_BOARD)?;
-    let config = receive(&input, config)?;
-    let node = build(config, node);
-    serve(&input, &output, node, reply)
+    let setup = receive(&input, setup)?;
+    let node = build(&setup.config, node);
+    if setup.channel == Channel::Uart {
+        core.SYST.enable_interrupt();
+        uart::start();
+    }
+    // Tells the host that both ends are open.
+    output.write(reply.finish(0))?;
+    match setup.channel {
+        Channel::Fifo => serve(&input, &output, node, reply),
+        Channel::Uart => {
+            adapter::serve(node, setup.period_ns());
+            reply.clear();
+            output.write(reply.finish(uart::RECEIVED.lost() as u32))
+        }
+    }
 }
 
 // Three steps out of line: each begins with the stack that the one before has given back.
 
 #[inline(never)]
-fn receive<'a>(input: &File, slot: &'a mut Option<Config>) -> Result<&'a Config, End> {
-    let mut record = [0; CONFIG_LEN];
+fn receive<'a>(input: &File, slot: &'a mut Option<Setup>) -> Result<&'a Setup, End> {
+    let mut record = [0; SETUP_LEN];
     input.read(&mut record)?;
-    Ok(slot.insert(config_from_bytes(&record).ok_or(End)?))
+    Ok(slot.insert(Setup::from_bytes(&record).ok_or(End)?))
 }
 
 #[inline(never)]
@@ -81,7 +89,7 @@ fn poll(node: &mut Node, now: u64, received: Option<CanFrame>, reply: &mut Reply
     before.wrapping_sub(SYST::get_current()) & SYST_MAX
 }
 
-/// SysTick from the core clock. It does not interrupt: the host's records drive this board.
+/// SysTick from the core clock, over its whole range.
 fn start_timer(timer: &mut SYST) {
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(SYST_MAX);
@@ -102,6 +110,22 @@ impl Bus for Port<'_> {
 
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
         self.reply.push(frame)
+    }
+}
+
+/// SysTick has wrapped; only while the UART is in use.
+#[exception]
+fn SysTick() {
+    adapter::wrapped();
+}
+
+/// Every interrupt of the board: those of the UART's receiver, no other is enabled.
+#[exception]
+unsafe fn DefaultHandler(irq: i16) {
+    if irq == uart::RECEIVE_IRQ {
+        uart::receive();
+    } else {
+        host::exit(Err(End));
     }
 }
 

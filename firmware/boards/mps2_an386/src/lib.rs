@@ -1,14 +1,18 @@
-//! The lock-step channel between the emulated board and the host that emulates it, compiled by both of its ends.
+//! What the emulated board and the host that emulates it tell each other, compiled by both of its ends.
 //!
 //! Two FIFOs, which the board opens through Arm semihosting in the emulator's working directory. The host says once what
-//! the controller is to know ([`config_to_bytes`]), then asks ([`Request`]) and waits for the answer ([`Reply`]) for ever
-//! after; every record from the host has a fixed length. The host ends the conversation by closing its end. Numbers are
-//! little-endian, frames are in the layout of Linux's `struct canfd_frame`.
+//! the controller is to know and how frames travel ([`Setup`]); the board answers once it is ready ([`Reply`]). Then
 //!
-//! This is the path for long comparisons: a round trip takes microseconds, where a UART takes milliseconds of emulation.
-//! What it carries are the frames of the bus, unchanged.
+//! - [`Channel::Fifo`]: the host asks ([`Request`]) and waits for the answer ([`Reply`]) for ever after, and ends the
+//!   conversation by closing its end. This is the path for long comparisons: a round trip takes microseconds.
+//! - [`Channel::Uart`]: frames travel as slcan lines over UART 0, as they would on silicon. An empty line acknowledges a
+//!   frame, after the frames that answer it. `O` opens the bus; `C` closes it, and the board's last [`Reply`] says how
+//!   many bytes its receiver has lost.
+//!
+//! Every record from the host has a fixed length. Numbers are little-endian, frames in records are in the layout of
+//! Linux's `struct canfd_frame`.
 
-#![no_std]
+#![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),
@@ -20,19 +24,22 @@
     )
 )]
 
+pub mod ring;
+
 use core::ffi::CStr;
 
 use firmware::controller::Config;
 use protocol::bus::TransmitError;
 use protocol::frame::{CanFrame, ExtendedId, FrameKind, Id, StandardId};
+use serde::{Deserialize, Serialize};
 
 /// FIFO that the host writes and the board reads.
 pub const TO_BOARD: &CStr = c"to-board";
 /// FIFO that the board writes and the host reads.
 pub const FROM_BOARD: &CStr = c"from-board";
 
-/// Bytes of the configuration record; more than any configuration takes, the rest is zero.
-pub const CONFIG_LEN: usize = 768;
+/// Bytes of the setup record; more than any setup takes, the rest is zero.
+pub const SETUP_LEN: usize = 768;
 /// Bytes of a frame: identifier and flags (4), length (1), FD flags (1), reserved (2), data (64).
 pub const FRAME_LEN: usize = 72;
 /// Bytes of a request: kind (1), time (8), frame.
@@ -48,18 +55,45 @@ const BRS: u8 = 1;
 const ESI: u8 = 2;
 const FDF: u8 = 4;
 
-/// The record that tells the board its configuration, or `None` if it does not fit.
-#[must_use]
-pub fn config_to_bytes(config: &Config) -> Option<[u8; CONFIG_LEN]> {
-    let mut bytes = [0; CONFIG_LEN];
-    postcard::to_slice(config, &mut bytes).ok()?;
-    Some(bytes)
+/// How frames travel between host and board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Channel {
+    /// In records over the FIFOs.
+    #[default]
+    Fifo,
+    /// As slcan over UART 0.
+    Uart,
 }
 
-/// The configuration in a record, or `None` if there is none.
-#[must_use]
-pub fn config_from_bytes(bytes: &[u8; CONFIG_LEN]) -> Option<Config> {
-    postcard::from_bytes(bytes).ok()
+/// What the host tells the board before anything else.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setup {
+    /// How frames travel.
+    pub channel: Channel,
+    /// What the controller is to know.
+    pub config: Config,
+}
+
+impl Setup {
+    /// The record, or `None` if it does not fit.
+    #[must_use]
+    pub fn to_bytes(&self) -> Option<[u8; SETUP_LEN]> {
+        let mut bytes = [0; SETUP_LEN];
+        postcard::to_slice(self, &mut bytes).ok()?;
+        Some(bytes)
+    }
+
+    /// The setup in a record, or `None` if there is none.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; SETUP_LEN]) -> Option<Self> {
+        postcard::from_bytes(bytes).ok()
+    }
+
+    /// Sampling period, ns, for a clock that counts samples: both ends have the same one.
+    #[must_use]
+    pub fn period_ns(&self) -> u64 {
+        u64::from((self.config.period * 1e9 + 0.5) as u32)
+    }
 }
 
 /// What the host asks for.
@@ -299,12 +333,14 @@ mod tests {
     #[test]
     fn the_configuration_comes_back_to_the_bit() {
         let mut config = Config::new(IRB_930, 1e-3);
+        let channel = Channel::Uart;
+        assert_eq!(Setup { channel, config }.period_ns(), 1_000_000);
         config.command_delay = 2.345e-4;
         config.arm.geometry.a2 = f32::from_bits(0x3EFA_E148);
-        assert_eq!(
-            config_from_bytes(&config_to_bytes(&config).unwrap()),
-            Some(config)
-        );
+        for channel in [Channel::Fifo, Channel::Uart] {
+            let setup = Setup { channel, config };
+            assert_eq!(Setup::from_bytes(&setup.to_bytes().unwrap()), Some(setup));
+        }
     }
 
     #[test]

@@ -1,0 +1,87 @@
+//! The board as a serial-line CAN adapter with a controller behind it.
+//!
+//! A frame is acknowledged by an empty line once the controller has looked at it; the frames it sent come before. So a
+//! host in lock-step knows when all is said. Time is that of the drives' samples.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use firmware::node::Node;
+use firmware::sample_clock::SampleClock;
+use protocol::bus::{Bus, TransmitError};
+use protocol::frame::CanFrame;
+use protocol::slcan::{Line, Parser, Text};
+
+use super::uart::{self, RECEIVED};
+
+/// Wraps of SysTick, 2^24 counts of 40 ns each, without a byte after which the host has gone: 20 s.
+const SILENCE: u32 = 30;
+
+/// Wraps of SysTick since the start.
+static WRAPS: AtomicU32 = AtomicU32::new(0);
+
+/// The SysTick interrupt.
+pub fn wrapped() {
+    // The only writer.
+    let wraps = WRAPS.load(Ordering::Relaxed);
+    WRAPS.store(wraps.wrapping_add(1), Ordering::Relaxed);
+}
+
+/// Speaks slcan until the host closes the bus or is silent for [`SILENCE`].
+#[inline(never)]
+pub fn serve(node: &mut Node, period_ns: u64) {
+    let mut clock = SampleClock::new(period_ns);
+    let mut parser = Parser::new();
+    let mut open = false;
+    while let Some(byte) = next_byte() {
+        let answer = match parser.push(byte) {
+            None => continue,
+            Some(Ok(Line::Frame(frame))) if open => {
+                clock.observe(&frame);
+                node.poll(clock.now(), &mut Port(Some(frame)));
+                Line::Empty
+            }
+            Some(Ok(Line::Open)) => {
+                open = true;
+                Line::Empty
+            }
+            Some(Ok(Line::Close)) if open => return,
+            // The bit rates are those of a bus that is not there.
+            Some(Ok(Line::Empty | Line::Close | Line::Bitrate(_) | Line::DataBitrate(_))) => {
+                Line::Empty
+            }
+            Some(_) => Line::Refused,
+        };
+        uart::send(Text::from(answer).as_bytes());
+    }
+}
+
+/// Sleeps until there is a byte; `None` when the host has gone.
+fn next_byte() -> Option<u8> {
+    let since = WRAPS.load(Ordering::Relaxed);
+    while WRAPS.load(Ordering::Relaxed).wrapping_sub(since) <= SILENCE {
+        if let Some(byte) = RECEIVED.pop() {
+            return Some(byte);
+        }
+        // With interrupts held back: one that comes after the look ends the sleep all the same, and is taken after it.
+        cortex_m::interrupt::free(|_| {
+            if RECEIVED.is_empty() {
+                cortex_m::asm::wfi();
+            }
+        });
+    }
+    None
+}
+
+/// The node's end of the line: the frame that has come, and the UART.
+struct Port(Option<CanFrame>);
+
+impl Bus for Port {
+    fn receive(&mut self) -> Option<CanFrame> {
+        self.0.take()
+    }
+
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        uart::send(Text::from(Line::Frame(*frame)).as_bytes());
+        Ok(())
+    }
+}

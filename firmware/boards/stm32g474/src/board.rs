@@ -1,0 +1,104 @@
+//! The image: frames come by interrupt, a 1 kHz timer guards, and one loop runs the node and shows its state on the pins.
+
+mod can;
+mod clock;
+mod safe;
+
+use core::sync::atomic::Ordering;
+
+use cortex_m::peripheral::{DWT, SCB};
+use cortex_m_rt::entry;
+use defmt_rtt as _;
+use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
+use embassy_stm32::wdg::IndependentWatchdog;
+use firmware::arm::IRB_930;
+use firmware::cabinet::Cabinet;
+use firmware::controller::Config;
+use firmware::mode::is_powered;
+use firmware::node::Node;
+use protocol::messages::{ControlWord, Mode};
+
+use can::{Can, Port, Received, ToSend};
+use clock::{CYCLES_PER_TICK, Clock, TICK};
+
+/// Time without a turn of the loop after which the watchdog resets the board, us: ten samples.
+const WATCHDOG_US: u32 = 10_000;
+
+defmt::timestamp!("{=u32:ms}", clock::TICKS.load(Ordering::Relaxed));
+
+#[entry]
+fn main() -> ! {
+    // Static, so that the stack holds calls only. The attribute hands these out once, as references.
+    static mut NODE: Option<Node> = None;
+    static mut TO_SEND: ToSend = ToSend::new();
+    static mut RECEIVED: Received = Received::new();
+
+    let board = embassy_stm32::init(clock::config());
+    // First of all: whatever hangs from here on ends in a reset, and a reset lets go of every pin.
+    let mut watchdog = IndependentWatchdog::new(board.IWDG, WATCHDOG_US);
+    watchdog.unleash();
+    safe::log_reset_reason();
+
+    let mut cabinet = Cabinet {
+        brake: Output::new(board.PC0, Level::Low, Speed::Low),
+        torque: Output::new(board.PC1, Level::Low, Speed::Low),
+        green: Output::new(board.PC2, Level::Low, Speed::Low),
+        red: Output::new(board.PC3, Level::Low, Speed::Low),
+        // A torn wire reads as an open chain.
+        estop: Input::new(board.PC4, Pull::Down),
+    };
+    let can = Can::start(board.FDCAN1, board.PA11, board.PA12, TO_SEND, RECEIVED);
+    let node = NODE.insert(Node::new(Config::new(IRB_930, TICK)));
+    let mut clock = Clock::start();
+    let mut port = Port::new(can);
+    let mut mode = Mode::Boot;
+    let mut worst = 0;
+    loop {
+        let ticked = clock.advance();
+        if ticked {
+            port.set_estop(cabinet.estop_pressed());
+        }
+        if ticked || port.has_frames() {
+            let before = DWT::cycle_count();
+            node.poll(clock.now(), &mut port);
+            let cycles = DWT::cycle_count().wrapping_sub(before);
+            if cycles > CYCLES_PER_TICK {
+                node.count_overrun();
+            }
+            if cycles > worst {
+                worst = cycles;
+                defmt::info!("worst call of the node so far: {} cycles", worst);
+            }
+            if port.reset_asked() {
+                safe::torque_off();
+                SCB::sys_reset();
+            }
+            let controller = node.controller();
+            if controller.mode() != mode {
+                mode = controller.mode();
+                defmt::info!("{} ({})", mode, controller.cause());
+            }
+            if cabinet.show(mode, control(mode, port.control())).is_err() {
+                defmt::error!("a pin does not do what it is told");
+            }
+        }
+        if ticked {
+            watchdog.pet();
+        }
+        // With interrupts held back: one that comes after the look ends the sleep all the same, and is taken after it.
+        cortex_m::interrupt::free(|_| {
+            if !clock.is_due() && !port.has_frames() {
+                cortex_m::asm::wfi();
+            }
+        });
+    }
+}
+
+/// What the pins are told. Without feedback there are no commands: then the last one must not stand.
+fn control(mode: Mode, sent: ControlWord) -> ControlWord {
+    if is_powered(mode) || mode == Mode::FaultReaction {
+        sent
+    } else {
+        ControlWord::EMPTY
+    }
+}

@@ -1,0 +1,265 @@
+//! FDCAN1: 1 Mbit/s nominal, 5 Mbit/s data, with hardware filters for what the node listens to.
+
+use core::num::{NonZeroU8, NonZeroU16};
+
+use embassy_stm32::can::config::{
+    DataBitTiming, FdCanConfig, FrameTransmissionConfig, GlobalFilter, NominalBitTiming,
+    TxBufferMode,
+};
+use embassy_stm32::can::enums::BusErrorMode;
+use embassy_stm32::can::filter::{Action, FilterType, StandardFilter, StandardFilterSlot};
+use embassy_stm32::can::frame::{FdFrame, Header};
+use embassy_stm32::can::{
+    BufferedCanFd, BufferedFdCanReceiver, BufferedFdCanSender, CanConfigurator,
+    IT0InterruptHandler, IT1InterruptHandler, OperatingMode, RxFdBuf, TxFdBuf,
+};
+use embassy_stm32::peripherals::{FDCAN1, PA11, PA12};
+use embassy_stm32::{Peri, bind_interrupts, pac};
+use protocol::bus::{Bus, TransmitError};
+use protocol::codec;
+use protocol::frame::{CanFrame, FrameKind, StandardId};
+use protocol::messages::{ControlWord, EStop, EStopReason, Message, NmtCommand, Node as Name};
+use protocol::table;
+
+/// Queue of frames received.
+pub type Received = RxFdBuf<RECEIVED>;
+/// Queue of frames to be sent.
+pub type ToSend = TxFdBuf<TO_SEND>;
+
+/// Frames that may wait between interrupt and loop, besides three in the hardware either way.
+const RECEIVED: usize = 16;
+const TO_SEND: usize = 8;
+
+/// What the node listens to. Everything else, extended and remote frames included, stops at the filters.
+const FILTERS: [(StandardFilterSlot, u16); 5] = [
+    (StandardFilterSlot::_0, table::NMT.id),
+    (StandardFilterSlot::_1, table::ESTOP.id),
+    (StandardFilterSlot::_2, table::FEEDBACK.id),
+    (StandardFilterSlot::_3, table::MOTION.id),
+    (
+        StandardFilterSlot::_4,
+        table::CONTROLLER_PARAMETER_REQUEST.id,
+    ),
+];
+
+/// Time quanta of 12.5 ns. Nominal: 1 + 63 + 16, sample point at 80 %.
+const NOMINAL: NominalBitTiming = NominalBitTiming {
+    prescaler: NonZeroU16::MIN,
+    seg1: NonZeroU8::new(63).unwrap(),
+    seg2: NonZeroU8::new(16).unwrap(),
+    sync_jump_width: NonZeroU8::new(16).unwrap(),
+};
+/// Data: 1 + 11 + 4, sample point at 75 %.
+const DATA: DataBitTiming = DataBitTiming {
+    transceiver_delay_compensation: true,
+    prescaler: NonZeroU16::MIN,
+    seg1: NonZeroU8::new(11).unwrap(),
+    seg2: NonZeroU8::new(4).unwrap(),
+    sync_jump_width: NonZeroU8::new(4).unwrap(),
+};
+/// Secondary sample point after the measured delay: where the data sample point is in the bit.
+const DELAY_OFFSET: u8 = 12;
+
+bind_interrupts!(struct Interrupts {
+    FDCAN1_IT0 => IT0InterruptHandler<FDCAN1>;
+    FDCAN1_IT1 => IT1InterruptHandler<FDCAN1>;
+});
+
+/// The CAN controller with its queues.
+pub struct Can {
+    driver: BufferedCanFd<'static, TO_SEND, RECEIVED>,
+    reader: BufferedFdCanReceiver,
+    writer: BufferedFdCanSender,
+}
+
+impl Can {
+    /// Joins the bus.
+    pub fn start(
+        peripheral: Peri<'static, FDCAN1>,
+        rx: Peri<'static, PA11>,
+        tx: Peri<'static, PA12>,
+        to_send: &'static mut ToSend,
+        received: &'static mut Received,
+    ) -> Self {
+        let mut can = CanConfigurator::new(peripheral, rx, tx, Interrupts);
+        for (slot, id) in FILTERS {
+            let id = StandardId::new(id).unwrap_or(StandardId::MAX);
+            let filter = FilterType::DedicatedSingle(id);
+            let action = Action::StoreInFifo0;
+            can.properties()
+                .set_standard_filter(slot, StandardFilter { filter, action });
+        }
+        can.set_config(
+            FdCanConfig::default()
+                .set_nominal_bit_timing(NOMINAL)
+                .set_data_bit_timing(DATA)
+                .set_frame_transmit(FrameTransmissionConfig::AllowFdCanAndBRS)
+                .set_global_filter(GlobalFilter::reject_all())
+                // By identifier: what waits longest must not hold back what is most urgent.
+                .set_tx_buffer_mode(TxBufferMode::Priority)
+                .set_automatic_bus_off_recovery(true),
+        );
+        let driver = can.start(OperatingMode::NormalOperationMode);
+        compensate_delay();
+        let driver = driver.buffered_fd(to_send, received);
+        Self {
+            reader: driver.reader(),
+            writer: driver.writer(),
+            driver,
+        }
+    }
+}
+
+/// Transceiver delay compensation (ISO 11898-1, 11.3.3): at 5 Mbit/s a bit is shorter than the way to the bus and back.
+/// The driver has no setting for it, and writes the registers when it starts.
+fn compensate_delay() {
+    let can = pac::FDCAN1;
+    can.cccr().modify(|w| w.set_init(true));
+    while !can.cccr().read().init() {}
+    can.cccr().modify(|w| w.set_cce(true));
+    can.tdcr().write(|w| w.set_tdco(DELAY_OFFSET));
+    can.dbtp().modify(|w| w.set_tdc(true));
+    // Clears CCE, too.
+    can.cccr().modify(|w| w.set_init(false));
+}
+
+/// The node's end of the bus.
+pub struct Port {
+    can: Can,
+    /// A frame taken from the queue to see whether there is one.
+    next: Option<CanFrame>,
+    estop: bool,
+    /// The emergency-stop chain has opened, and the node has not been told.
+    estop_due: bool,
+    control: ControlWord,
+    reset_asked: bool,
+    offline: bool,
+}
+
+impl Port {
+    pub fn new(can: Can) -> Self {
+        Self {
+            can,
+            next: None,
+            estop: false,
+            estop_due: false,
+            control: ControlWord::EMPTY,
+            reset_asked: false,
+            offline: false,
+        }
+    }
+
+    /// Control word of the last command sent.
+    pub fn control(&self) -> ControlWord {
+        self.control
+    }
+
+    /// Network management has asked for a reset.
+    pub fn reset_asked(&self) -> bool {
+        self.reset_asked
+    }
+
+    /// Notes the emergency-stop chain. While it is open the node hears so in every call; the other nodes hear it once,
+    /// and from then on by the state.
+    pub fn set_estop(&mut self, pressed: bool) {
+        if pressed && !self.estop {
+            defmt::warn!("emergency-stop chain open");
+            if let Some(frame) = estop_frame() {
+                let _ = self.transmit(&frame);
+            }
+        }
+        self.estop = pressed;
+        self.estop_due = pressed;
+    }
+
+    /// Whether a frame is waiting.
+    pub fn has_frames(&mut self) -> bool {
+        // The queue holds frames and, in between, errors of the bus, which the controller deals with by itself.
+        while self.next.is_none() {
+            match self.can.reader.try_receive() {
+                Ok(Ok(envelope)) => self.next = from_driver(&envelope.frame),
+                Ok(Err(_)) => {}
+                Err(_) => return false,
+            }
+        }
+        true
+    }
+}
+
+impl Bus for Port {
+    fn receive(&mut self) -> Option<CanFrame> {
+        if self.estop_due {
+            self.estop_due = false;
+            return estop_frame();
+        }
+        self.has_frames();
+        let frame = self.next.take()?;
+        if is_reset(&frame) {
+            self.reset_asked = true;
+        }
+        Some(frame)
+    }
+
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        let mode = self.can.driver.properties().bus_error_mode();
+        let offline = matches!(mode, BusErrorMode::BusOff);
+        if offline != self.offline {
+            self.offline = offline;
+            defmt::warn!("bus-off: {}", offline);
+        }
+        if let Ok(received) = codec::decode(frame)
+            && let Message::Command(command) = received.message
+        {
+            self.control = command.control;
+        }
+        if offline {
+            return Err(TransmitError::Offline);
+        }
+        let frame = to_driver(frame).ok_or(TransmitError::QueueFull)?;
+        self.can
+            .writer
+            .try_write(frame)
+            .map_err(|_| TransmitError::QueueFull)
+    }
+}
+
+fn estop_frame() -> Option<CanFrame> {
+    let estop = EStop {
+        reason: EStopReason::BUTTON,
+        counter: 0,
+    };
+    codec::encode(&Message::EStop(estop), 0).ok()
+}
+
+fn is_reset(frame: &CanFrame) -> bool {
+    let Ok(received) = codec::decode(frame) else {
+        return false;
+    };
+    let Message::Nmt(nmt) = received.message else {
+        return false;
+    };
+    nmt.command == NmtCommand::ResetNode && (nmt.node == 0 || nmt.node == Name::Controller.code())
+}
+
+/// A frame as received; `None` for a remote frame, which the filters do not let through.
+fn from_driver(frame: &FdFrame) -> Option<CanFrame> {
+    let header = frame.header();
+    let data = frame.data().get(..usize::from(header.len()))?;
+    if header.rtr() {
+        None
+    } else if header.fdcan() {
+        CanFrame::fd(*header.id(), data, header.bit_rate_switching())
+    } else {
+        CanFrame::classical(*header.id(), data)
+    }
+}
+
+fn to_driver(frame: &CanFrame) -> Option<FdFrame> {
+    let data = frame.data();
+    let len = data.len() as u8;
+    let header = match frame.kind() {
+        FrameKind::Classical { remote } => Header::new(frame.id(), len, remote),
+        FrameKind::Fd { brs, .. } => Header::new_fd(frame.id(), len, false, brs),
+    };
+    FdFrame::new(header, data).ok()
+}
