@@ -1,6 +1,7 @@
 """11-slcan.py PORT TRACE PID: watches the bus on PORT with python-can until process PID has ended, then holds what it
 saw against the trace: every frame, with identifier, data and FD flags."""
 
+import contextlib
 import os
 import sys
 from collections import Counter
@@ -9,16 +10,18 @@ import can
 
 port, trace, pid = sys.argv[1], sys.argv[2], int(sys.argv[3])
 seen = []
-with can.Bus(interface="slcan", channel=f"socket://127.0.0.1:{port}", bitrate=1_000_000, sleep_after_open=0) as bus:
-    while True:
-        try:
-            message = bus.recv(timeout=0.5)
-        except (can.CanError, OSError):
-            break  # the run has ended and closed the port
-        if message is not None:
-            seen.append(message)
-        elif not os.path.exists(f"/proc/{pid}"):
-            break
+bus = can.Bus(interface="slcan", channel=f"socket://127.0.0.1:{port}", bitrate=1_000_000, sleep_after_open=0)
+while True:
+    try:
+        message = bus.recv(timeout=0.5)
+    except (can.CanError, OSError):
+        break  # the run has ended and closed the port
+    if message is not None:
+        seen.append(message)
+    elif not os.path.exists(f"/proc/{pid}"):
+        break
+with contextlib.suppress(can.CanError, OSError):
+    bus.shutdown()  # takes leave of a port that may be closed
 
 
 def key(message):

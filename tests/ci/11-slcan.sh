@@ -7,7 +7,7 @@ controller=$target/debug/controller
 python_peers python-can==4.6.1 pyserial==3.5
 cd "$work"
 fail() { echo "FAIL: $*"; tail -n 5 ./*.err; exit 1; }
-trap 'kill $(jobs -p) 2>/dev/null; rm -rf "$work"' EXIT
+trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$work"' EXIT
 # The part of the port range that Linux does not hand out by itself.
 port=$((20000 + RANDOM % 10000))
 
@@ -50,3 +50,4 @@ timeout 90 "$plant_sim" run --cycles 1 --listen "slcan:tcp:127.0.0.1:$((port + 2
 for _ in $(seq 600); do grep -qs "waiting for a client" watched.err && break; sleep 0.1; done
 timeout 90 "$python" "$OLDPWD/tests/ci/11-slcan.py" $((port + 2)) watched/trace.log $process ||
     fail "python-can saw other frames than the trace holds"
+wait $process || fail "run that was watched"
