@@ -34,8 +34,8 @@ where
     Red: OutputPin,
     EStop: InputPin,
 {
-    /// Writes all outputs for `mode` and the control word of the last command. Torque follows the
-    /// command, not the mode: while the brake closes after a fault, torque still holds the load.
+    /// Writes all outputs for `mode` and the controller's control word. Torque follows the control
+    /// word, not the mode: while the brake closes after a fault, torque still holds the load.
     ///
     /// # Errors
     /// [`PinFault`] if any pin failed; the others are written all the same.

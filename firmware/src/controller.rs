@@ -218,6 +218,10 @@ impl Controller {
 
     /// Something happened outside: self-test passed, peer found or lost, emergency stop.
     pub fn event(&mut self, event: Event, cause: Cause) {
+        if event == Event::PeerLost {
+            // Nothing can be brought to rest any more, not even in an emergency stop.
+            self.shutdown = Shutdown::Off;
+        }
         let Some(next) = mode::transition(self.mode, event) else {
             return;
         };
@@ -414,7 +418,9 @@ impl Controller {
         }
     }
 
-    fn control_word(&self) -> ControlWord {
+    /// What drives and pins are to do now: unlike the command sent last, it also follows what
+    /// happens between two samples.
+    pub fn control_word(&self) -> ControlWord {
         let holding = self.is_holding();
         let closing = matches!(self.shutdown, Shutdown::Closing(_));
         ControlWord::EMPTY

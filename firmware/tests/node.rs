@@ -420,6 +420,25 @@ fn an_emergency_stop_is_latched() {
 }
 
 #[test]
+fn a_peer_that_goes_silent_during_an_emergency_stop_leaves_no_torque() {
+    let mut bench = Bench::enabled();
+    bench.wire.to_node.push_back(estop());
+    bench.step();
+    assert!(
+        bench
+            .node
+            .controller()
+            .control_word()
+            .contains(ControlWord::TORQUE_ENABLE)
+    );
+    bench.now += PEER_TIMEOUT_US + 1;
+    bench.poll();
+    assert_eq!(bench.mode(), Mode::EStop);
+    let word = bench.node.controller().control_word();
+    assert_eq!(word, ControlWord::ESTOP);
+}
+
+#[test]
 fn three_bad_feedback_frames_in_a_row_stop_the_arm() {
     let mut bench = Bench::enabled();
     let good = bench.next_feedback();

@@ -14,9 +14,8 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use firmware::arm::IRB_930;
 use firmware::cabinet::Cabinet;
 use firmware::controller::Config;
-use firmware::mode::is_powered;
 use firmware::node::Node;
-use protocol::messages::{ControlWord, Mode};
+use protocol::messages::Mode;
 
 use can::{Can, Port, Received, ToSend};
 use clock::{CYCLES_PER_TICK, Clock, TICK};
@@ -78,7 +77,7 @@ fn main() -> ! {
                 mode = controller.mode();
                 defmt::info!("{} ({})", mode, controller.cause());
             }
-            if cabinet.show(mode, control(mode, port.control())).is_err() {
+            if cabinet.show(mode, controller.control_word()).is_err() {
                 defmt::error!("a pin does not do what it is told");
             }
         }
@@ -91,14 +90,5 @@ fn main() -> ! {
                 cortex_m::asm::wfi();
             }
         });
-    }
-}
-
-/// What the pins are told. Without feedback there are no commands: then the last one must not stand.
-fn control(mode: Mode, sent: ControlWord) -> ControlWord {
-    if is_powered(mode) || mode == Mode::FaultReaction {
-        sent
-    } else {
-        ControlWord::EMPTY
     }
 }

@@ -18,7 +18,7 @@ use embassy_stm32::{Peri, bind_interrupts, pac};
 use protocol::bus::{Bus, TransmitError};
 use protocol::codec;
 use protocol::frame::{CanFrame, FrameKind, StandardId};
-use protocol::messages::{ControlWord, EStop, EStopReason, Message, NmtCommand, Node as Name};
+use protocol::messages::{EStop, EStopReason, Message, NmtCommand, Node as Name};
 use protocol::table;
 
 /// Queue of frames received.
@@ -131,7 +131,6 @@ pub struct Port {
     estop: bool,
     /// The emergency-stop chain has opened, and the node has not been told.
     estop_due: bool,
-    control: ControlWord,
     reset_asked: bool,
     offline: bool,
 }
@@ -143,15 +142,9 @@ impl Port {
             next: None,
             estop: false,
             estop_due: false,
-            control: ControlWord::EMPTY,
             reset_asked: false,
             offline: false,
         }
-    }
-
-    /// Control word of the last command sent.
-    pub fn control(&self) -> ControlWord {
-        self.control
     }
 
     /// Network management has asked for a reset.
@@ -206,11 +199,6 @@ impl Bus for Port {
         if offline != self.offline {
             self.offline = offline;
             defmt::warn!("bus-off: {}", offline);
-        }
-        if let Ok(received) = codec::decode(frame)
-            && let Message::Command(command) = received.message
-        {
-            self.control = command.control;
         }
         if offline {
             return Err(TransmitError::Offline);
