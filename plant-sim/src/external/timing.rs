@@ -83,7 +83,8 @@ pub struct Timing {
     pub lateness: Distribution,
     /// Difference of the time between two samples from the period.
     pub jitter: Distribution,
-    /// Feedback out to command in.
+    /// Feedback out to command in: the age of a measurement when its command begins to act, since drives apply a
+    /// command when it arrives.
     pub latency: Distribution,
     missed: u64,
     overruns: u64,
@@ -172,7 +173,7 @@ impl Timing {
         for (name, times) in [
             ("sample after its deadline", &self.lateness),
             ("period minus its nominal value", &self.jitter),
-            ("feedback out to command in", &self.latency),
+            ("feedback to command, age at use", &self.latency),
         ] {
             let [half, most, nearly] = [0.5, 0.99, 0.999].map(|share| us(times.quantile(share)));
             let _ = writeln!(
