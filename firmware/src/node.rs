@@ -328,11 +328,8 @@ impl Node {
     }
 
     fn send<B: Bus>(&mut self, message: &Message, counter: u8, bus: &mut B) {
-        // By reference: to move a frame out of its result is to copy it.
-        let sent = codec::encode(message, counter)
-            .as_ref()
-            .is_ok_and(|frame| bus.transmit(frame).is_ok());
-        if !sent {
+        let sent = codec::encode_with(message, counter, |frame| bus.transmit(frame));
+        if !matches!(sent, Ok(Ok(()))) {
             self.unsent = self.unsent.saturating_add(1);
         }
     }

@@ -96,17 +96,20 @@ pub enum DecodeError {
 /// # Errors
 /// A float is not finite or out of its range: what every receiver would refuse is not sent.
 pub fn encode(message: &Message, counter: u8) -> Result<CanFrame, EncodeError> {
+    encode_with(message, counter, |frame| *frame)
+}
+
+/// As [`encode`], for a sender that only looks at the frame: to return one is to copy it, which takes longer than to
+/// make it.
+///
+/// # Errors
+/// Those of [`encode`]; `look` is not called then.
+pub fn encode_with<T>(
+    message: &Message,
+    counter: u8,
+    look: impl FnOnce(&CanFrame) -> T,
+) -> Result<T, EncodeError> {
     let info = info_of(message);
-    let mut buffer = [0; FD_MAX];
-    let data = buffer.get_mut(..info.len).ok_or(EncodeError::TooLong)?;
-    let body = data
-        .get_mut(..info.body_len())
-        .ok_or(EncodeError::TooLong)?;
-    write(message, body).ok_or(EncodeError::TooLong)?;
-    check_values(message, info, body).map_err(EncodeError::Value)?;
-    if let Some(profile) = info.protection {
-        profile.protect(info.id, counter, data);
-    }
     let id = StandardId::new(info.id).ok_or(EncodeError::TooLong)?;
     let kind = if info.is_fd() {
         FrameKind::Fd {
@@ -116,7 +119,17 @@ pub fn encode(message: &Message, counter: u8) -> Result<CanFrame, EncodeError> {
     } else {
         FrameKind::Classical { remote: false }
     };
-    CanFrame::filled(id, kind, info.len, &buffer).ok_or(EncodeError::TooLong)
+    let mut frame = CanFrame::zeroed(id, kind, info.len).ok_or(EncodeError::TooLong)?;
+    let data = frame.data_mut();
+    let body = data
+        .get_mut(..info.body_len())
+        .ok_or(EncodeError::TooLong)?;
+    write(message, body).ok_or(EncodeError::TooLong)?;
+    check_values(message, info, body).map_err(EncodeError::Value)?;
+    if let Some(profile) = info.protection {
+        profile.protect(info.id, counter, data);
+    }
+    Ok(look(&frame))
 }
 
 /// Message of a frame. Bit rate switch and error state indicator belong to the link and do not matter.

@@ -100,14 +100,8 @@ impl CanFrame {
         Self::with_data(id.into(), FrameKind::Fd { brs, esi: false }, data)
     }
 
-    /// The encoder's frame: the first `len` bytes of a buffer that is zero beyond them. `None` if the format has no such
-    /// length.
-    pub(crate) fn filled(
-        id: StandardId,
-        kind: FrameKind,
-        len: usize,
-        buffer: &[u8; FD_MAX],
-    ) -> Option<Self> {
+    /// The encoder's frame, to be filled in place; its data bytes are zero. `None` if the format has no such length.
+    pub(crate) fn zeroed(id: StandardId, kind: FrameKind, len: usize) -> Option<Self> {
         let longest = match kind {
             FrameKind::Classical { .. } => CLASSICAL_MAX,
             FrameKind::Fd { .. } => FD_MAX,
@@ -119,8 +113,15 @@ impl CanFrame {
             id: id.into(),
             kind,
             len: len as u8,
-            buffer: *buffer,
+            buffer: [0; FD_MAX],
         })
+    }
+
+    /// The data bytes of [`Self::zeroed`].
+    pub(crate) fn data_mut(&mut self) -> &mut [u8] {
+        self.buffer
+            .get_mut(..usize::from(self.len))
+            .unwrap_or_default()
     }
 
     /// The same frame with this error state indicator. A classical frame has none and stays as it is.

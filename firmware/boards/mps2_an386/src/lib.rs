@@ -195,7 +195,7 @@ impl Reply {
             .get_mut(at..)
             .and_then(<[u8]>::first_chunk_mut::<FRAME_LEN>)
             .ok_or(TransmitError::QueueFull)?;
-        *record = frame_to_bytes(frame);
+        write_frame(frame, record);
         self.frames += 1;
         Ok(())
     }
@@ -223,22 +223,31 @@ pub fn reply_header(header: [u8; REPLY_HEADER]) -> (u32, u32) {
 /// A frame as `struct canfd_frame`.
 #[must_use]
 pub fn frame_to_bytes(frame: &CanFrame) -> [u8; FRAME_LEN] {
+    let mut bytes = [0; FRAME_LEN];
+    write_frame(frame, &mut bytes);
+    bytes
+}
+
+/// Writes a frame as `struct canfd_frame`; bytes beyond its data stay as they were.
+fn write_frame(frame: &CanFrame, record: &mut [u8; FRAME_LEN]) {
     let (remote, flags) = match frame.kind() {
         FrameKind::Classical { remote } => (remote, 0),
         FrameKind::Fd { brs, esi } => (false, FDF | (u8::from(brs) * BRS) | (u8::from(esi) * ESI)),
     };
     let id =
         frame.raw_id() | (u32::from(frame.is_extended()) * EXTENDED) | (u32::from(remote) * REMOTE);
+    let data = frame.data();
     let len = if remote {
         usize::from(frame.dlc())
     } else {
-        frame.data().len()
+        data.len()
     };
-    let mut bytes = [0; FRAME_LEN];
-    put(&mut bytes, 0, &id.to_le_bytes());
-    put(&mut bytes, 4, &[len as u8, flags]);
-    put(&mut bytes, 8, frame.data());
-    bytes
+    let [a, b, c, d] = id.to_le_bytes();
+    let (header, rest) = record.split_at_mut(8);
+    header.copy_from_slice(&[a, b, c, d, len as u8, flags, 0, 0]);
+    if let Some(place) = rest.get_mut(..data.len()) {
+        place.copy_from_slice(data);
+    }
 }
 
 /// The frame in a `struct canfd_frame`, or `None` if no controller could have sent it.
