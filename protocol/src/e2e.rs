@@ -101,6 +101,10 @@ fn crc16(data_id: u16, bytes: &[u8]) -> u16 {
     for word in words {
         crc = remainder_16(crc << 16 ^ u32::from_be_bytes(*word));
     }
+    let (pairs, rest) = rest.as_chunks::<2>();
+    for pair in pairs {
+        crc = remainder_16(crc ^ u32::from(u16::from_be_bytes(*pair)));
+    }
     for byte in rest {
         crc = remainder_16(crc >> 8 ^ u32::from(*byte)) ^ crc << 8 & 0xFF00;
     }

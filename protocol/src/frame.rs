@@ -60,13 +60,15 @@ pub enum FrameKind {
 
 /// One frame as it stands on the bus, without the fields a controller adds (CRC, stuffing, acknowledge).
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
+// In this order the data stand on a word's border, and are copied by words.
+#[repr(C)]
 pub struct CanFrame {
+    /// Zero from the end of the data on, so that derived equality is that of the frames.
+    buffer: [u8; FD_MAX],
     id: Id,
     kind: FrameKind,
     /// Data bytes; of a remote frame the number asked for.
     len: u8,
-    /// Zero from the end of the data on, so that derived equality is that of the frames.
-    buffer: [u8; FD_MAX],
 }
 
 impl CanFrame {
