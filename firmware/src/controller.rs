@@ -20,11 +20,12 @@ use serde::{Deserialize, Serialize};
 use crate::arm::{ArmModel, Payload};
 use crate::body::Body;
 use crate::kinematics::Trig;
-use crate::laws::{Gains, Memory, Selection, Situation};
+use crate::laws::{Gains, Memory, Model, Motion, Selection, Situation, Task};
 use crate::limits;
 use crate::math::clamp;
 use crate::mode::{self, Event};
 use crate::monitor::{Finding, Monitor, MonitorLimits};
+use crate::phase::{Phase, Probe};
 use crate::trajectory::Reference;
 use crate::trajectory::capacity::Capacity;
 use crate::trajectory::queue::{CAPACITY, MoveQueue, Progress};
@@ -107,7 +108,9 @@ enum Shutdown {
 }
 
 /// The controller of one arm.
+// In this order all that a sample looks at lies within reach of one base register; the queue is longer than that.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Controller {
     config: Config,
     body: Body,
@@ -117,17 +120,18 @@ pub struct Controller {
     /// Samples until the brake has opened.
     opening: u32,
     shutdown: Shutdown,
-    queue: MoveQueue,
     /// Planning steps a sample.
     planning_steps: u8,
     /// The reference of the last sample, as handed to the law.
     reference: Reference,
     memory: Memory,
     monitor: Monitor,
-    saturated: Vector4<f32>,
+    excess: Vector4<f32>,
     limited: u16,
     error: Vector4<f32>,
     replies: Deque<MotionReply, { 2 * CAPACITY }>,
+    unanswered: u16,
+    queue: MoveQueue,
 }
 
 impl Controller {
@@ -145,14 +149,15 @@ impl Controller {
             opening: 0,
             shutdown: Shutdown::Off,
             queue: MoveQueue::new(),
-            planning_steps: clamp(config.period * 4e3, 1.0, 40.0) as u8,
+            planning_steps: clamp(config.period * 1e3 + 0.5, 1.0, 10.0) as u8,
             reference: Reference::rest(Vector4::zeros()),
             memory: Memory::new(),
-            monitor: Monitor::default(),
-            saturated: Vector4::zeros(),
+            monitor: Monitor::new(&config.arm, &config.monitor),
+            excess: Vector4::zeros(),
             limited: 0,
             error: Vector4::zeros(),
             replies: Deque::new(),
+            unanswered: 0,
         }
     }
 
@@ -211,6 +216,16 @@ impl Controller {
         self.queue.completed()
     }
 
+    /// Answers that are due.
+    pub fn answers_waiting(&self) -> usize {
+        self.replies.len()
+    }
+
+    /// Requests that got no answer, since too many others waited for theirs.
+    pub fn unanswered(&self) -> u16 {
+        self.unanswered
+    }
+
     /// An answer to an operator that is due.
     pub fn take_reply(&mut self) -> Option<MotionReply> {
         self.replies.pop_front()
@@ -261,7 +276,7 @@ impl Controller {
 
     /// One sample. Worst case: one trajectory evaluation and one control law. Planning is not part
     /// of it: [`Controller::plan`] follows when the command is on its way.
-    pub fn step(&mut self, readings: &Readings) -> Actions {
+    pub fn step<P: Probe>(&mut self, readings: &Readings, probe: &mut P) -> Actions {
         let drive = &self.body.drive;
         let q = drive.joint_angle(&drive.motor_angle_of_counts(&readings.counts));
         let qd = drive.joint_speed(&readings.speed);
@@ -282,31 +297,40 @@ impl Controller {
             self.queue.clear(&q);
             self.error = Vector4::zeros();
             self.limited = 0;
-            self.saturated = Vector4::zeros();
+            self.excess = Vector4::zeros();
             return Actions {
                 control: self.control_word(),
                 torque: [0.0; 4],
             };
         }
-        let reference = self.advance(readings.steps.min(MAX_GAP));
+        self.reference = self.advance(readings.steps.min(MAX_GAP));
+        let reference = &self.reference;
         let lead = self.config.command_delay + 0.5 * self.config.period;
-        self.reference = reference;
         self.error = reference.q - q;
 
-        let trig = Trig::new(&q);
         let period = self.config.period;
-        let situation = Situation {
-            arm: &self.config.arm,
-            body: &self.body,
-            trig: &trig,
+        let motion = Motion {
             q,
             qd,
             torque: measured_torque,
             reference,
-            mean_qd: mean_velocity(&reference, period),
-            ahead: extrapolate(&reference, lead),
+            mean_qd: mean_velocity(reference, period),
+            ahead_qd: reference.qd + reference.qdd * lead + reference.qddd * (0.5 * lead * lead),
+            ahead_qdd: reference.qdd + reference.qddd * lead,
             period,
-            saturated: self.saturated,
+            excess: self.excess,
+        };
+        probe.end(Phase::Reference);
+        let trig = Trig::new(&q);
+        let task = Task::new(&self.config.arm.geometry, &trig, &motion);
+        probe.end(Phase::Kinematics);
+        let model = Model::new(&self.body, &trig, &motion);
+        probe.end(Phase::Dynamics);
+        let situation = Situation {
+            motion: &motion,
+            task: &task,
+            model: &model,
+            nominal_inertia: &self.body.nominal_inertia,
         };
         if self.mode == Mode::Enabling || matches!(self.shutdown, Shutdown::Closing(_)) {
             // The brake holds: what it carries must not be taken for a disturbance.
@@ -323,9 +347,11 @@ impl Controller {
                 value: 0.0,
             });
         }
+        probe.end(Phase::Law);
         let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
-        self.saturated = limited.saturated;
+        self.excess = limited.excess;
         self.limited = limited.flags;
+        probe.end(Phase::Limits);
         Actions {
             control: self.control_word(),
             torque: limited.motor_torque.into(),
@@ -333,8 +359,11 @@ impl Controller {
     }
 
     fn reply(&mut self, sequence: u8, outcome: Outcome) {
-        // The outbox is as long as everything that can be waiting for an answer.
-        let _ = self.replies.push_back(MotionReply { sequence, outcome });
+        let reply = MotionReply { sequence, outcome };
+        // The outbox holds an answer to everything that can wait to be planned, and as many again.
+        if self.replies.push_back(reply).is_err() {
+            self.unanswered = self.unanswered.saturating_add(1);
+        }
     }
 
     // --- modes ----------------------------------------------------------------------------
@@ -380,14 +409,7 @@ impl Controller {
         let error = self.reference.q - q;
         // The reference of the last sample: at most one sample of motion older than `q`.
         let moved = self.reference.qd * self.config.period;
-        if let Some(finding) = self.monitor.check(
-            &self.config.arm,
-            &self.config.monitor,
-            status,
-            q,
-            qd,
-            &(error + moved),
-        ) {
+        if let Some(finding) = self.monitor.check(status, q, qd, &(error + moved)) {
             self.fail(finding);
         }
     }
@@ -446,12 +468,12 @@ impl Controller {
         }
     }
 
-    /// Plans on, for the time until the next sample: four steps for every millisecond of the
-    /// sampling period, at least one. Off the way from measurement to command, which it would
-    /// only make late.
-    pub fn plan(&mut self) {
-        if !self.is_holding() {
-            return;
+    /// Plans on, for the time until the next sample: a step for every millisecond of the sampling
+    /// period, at least one. Off the way from measurement to command, which it would only make
+    /// late. Returns whether there was anything to plan.
+    pub fn plan(&mut self) -> bool {
+        if !self.is_holding() || !self.queue.has_to_plan() {
+            return false;
         }
         let capacity = Capacity {
             arm: &self.config.arm,
@@ -460,12 +482,14 @@ impl Controller {
         for _ in 0..self.planning_steps {
             match self.queue.plan(&capacity) {
                 None => {}
-                Some((sequence, Ok(()))) => return self.reply(sequence, Outcome::Accepted),
-                Some((sequence, Err(refusal))) => {
-                    return self.reply(sequence, Outcome::Refused(refusal));
+                Some((sequence, answer)) => {
+                    let outcome = answer.map_or_else(Outcome::Refused, |()| Outcome::Accepted);
+                    self.reply(sequence, outcome);
+                    break;
                 }
             }
         }
+        true
     }
 
     /// The reference at this sample.
@@ -505,15 +529,4 @@ impl Controller {
 /// Mean velocity over the sample that ends at `reference`, exact for constant jerk.
 fn mean_velocity(reference: &Reference, period: f32) -> Vector4<f32> {
     reference.qd - reference.qdd * (0.5 * period) + reference.qddd * (period * period / 6.0)
-}
-
-/// The reference `lead` seconds on, exact for constant jerk.
-fn extrapolate(reference: &Reference, lead: f32) -> Reference {
-    let Reference { q, qd, qdd, qddd } = *reference;
-    Reference {
-        q: q + qd * lead + qdd * (0.5 * lead * lead),
-        qd: qd + qdd * lead + qddd * (0.5 * lead * lead),
-        qdd: qdd + qddd * lead,
-        qddd,
-    }
 }

@@ -91,6 +91,12 @@ impl Jacobian {
         jacobian
     }
 
+    /// Where the flange is, in x and y of frame 0 (m): two elements of the Jacobian say so.
+    #[must_use]
+    pub fn position(&self) -> (f32, f32) {
+        (self.y1, -self.x1)
+    }
+
     /// Determinant of the task Jacobian, `a1 a2 sin theta2` (m^2). Its magnitude is Yoshikawa's manipulability; the
     /// determinant of the paper's eq. 29 lacks a2.
     #[must_use]

@@ -29,12 +29,18 @@ impl MonitorLimits {
     };
 }
 
-/// Counts violations in a row.
-#[derive(Clone, Copy, Debug, Default)]
+/// Watches one arm: its limits, made ready for every sample, and violations in a row.
+#[derive(Clone, Copy, Debug)]
 pub struct Monitor {
-    following: u8,
-    speed: u8,
-    range: u8,
+    following_error: Vector4<f32>,
+    speed: Vector4<f32>,
+    /// Middle of the joint ranges, and how far from it a joint may be.
+    middle: Vector4<f32>,
+    reach: Vector4<f32>,
+    needed: u8,
+    following_count: u8,
+    speed_count: u8,
+    range_count: u8,
 }
 
 /// A fault with the axis and value that caused it.
@@ -49,11 +55,23 @@ pub struct Finding {
 }
 
 impl Monitor {
+    /// A monitor of `arm` that has seen nothing.
+    pub fn new(arm: &ArmModel, limits: &MonitorLimits) -> Self {
+        Self {
+            following_error: limits.following_error,
+            speed: arm.limits.velocity * limits.speed_factor,
+            middle: 0.5 * (arm.limits.upper + arm.limits.lower),
+            reach: 0.5 * (arm.limits.upper - arm.limits.lower) + limits.range_margin,
+            needed: limits.samples,
+            following_count: 0,
+            speed_count: 0,
+            range_count: 0,
+        }
+    }
+
     /// Judges one sample; `error` is reference minus measured position.
     pub fn check(
         &mut self,
-        arm: &ArmModel,
-        limits: &MonitorLimits,
         status: DriveStatus,
         q: &Vector4<f32>,
         qd: &Vector4<f32>,
@@ -66,25 +84,26 @@ impl Monitor {
                 value: f32::from(status.bits()),
             });
         }
-        let following = first_beyond(error, &limits.following_error);
-        let speed = first_beyond(qd, &(arm.limits.velocity * limits.speed_factor));
-        let middle = 0.5 * (arm.limits.upper + arm.limits.lower);
-        let reach = 0.5 * (arm.limits.upper - arm.limits.lower) + limits.range_margin;
-        let range = first_beyond(&(q - middle), &reach);
-        let needed = limits.samples;
-        count(
-            &mut self.following,
+        let following = first_beyond(error, &self.following_error);
+        let speed = first_beyond(qd, &self.speed);
+        let range = first_beyond(&(q - self.middle), &self.reach);
+        let needed = self.needed;
+        let following = count(
+            &mut self.following_count,
             following,
             needed,
             Cause::FollowingError,
-        )
-        .or(count(&mut self.speed, speed, needed, Cause::OverSpeed))
-        .or(count(&mut self.range, range, needed, Cause::SoftLimit))
+        );
+        let speed = count(&mut self.speed_count, speed, needed, Cause::OverSpeed);
+        let range = count(&mut self.range_count, range, needed, Cause::SoftLimit);
+        following.or(speed).or(range)
     }
 
     /// Forgets the counts, for a new start.
     pub fn reset(&mut self) {
-        *self = Self::default();
+        self.following_count = 0;
+        self.speed_count = 0;
+        self.range_count = 0;
     }
 }
 

@@ -19,6 +19,7 @@ use protocol::schema::SCHEMA_HASH;
 
 use crate::controller::{Config, Controller, Readings};
 use crate::mode::Event;
+use crate::phase::{Phase, Probe};
 use crate::self_test;
 
 /// Frames taken from the bus in one call; more wait for the next.
@@ -29,6 +30,10 @@ pub const PEER_TIMEOUT_US: u64 = 100_000;
 const STATE_PERIOD_US: u64 = 20_000;
 /// Period of the heartbeat, µs.
 const HEARTBEAT_PERIOD_US: u64 = 100_000;
+/// Planning rests in every tenth sample, so that what is to be reported waits no longer.
+const REPORT_SAMPLES: u32 = 10;
+/// Answers that may wait for such a sample.
+const MAX_ANSWERS_WAITING: usize = 2;
 /// Rejected, stale or duplicate feedback frames in a row that stop the arm.
 const MAX_BAD_FEEDBACK: u8 = 3;
 
@@ -95,9 +100,9 @@ impl Node {
         &self.received
     }
 
-    /// Frames that could not be sent so far.
+    /// Frames that could not be sent so far, answers to a flood of requests included.
     pub fn unsent(&self) -> u16 {
-        self.unsent
+        self.unsent.saturating_add(self.controller.unanswered())
     }
 
     /// A shell reports a tick that ended after its deadline.
@@ -108,34 +113,55 @@ impl Node {
     /// Takes what has arrived, at most [`FRAMES_PER_POLL`] frames, and answers. `now` is a time
     /// in µs that never runs backwards; where it starts does not matter.
     pub fn poll<B: Bus>(&mut self, now: u64, bus: &mut B) {
+        self.poll_with(now, bus, &mut ());
+    }
+
+    /// As [`Node::poll`], with a probe that measures the phases.
+    pub fn poll_with<B: Bus, P: Probe>(&mut self, now: u64, bus: &mut B, probe: &mut P) {
         if self.controller.mode() == Mode::SelfTest {
             match self_test::run(self.controller.arm()) {
                 Ok(()) => self.controller.event(Event::SelfTestPassed, Cause::None),
                 Err(()) => self.controller.latch(Cause::SelfTest),
             }
         }
+        let mut planned = false;
         for _ in 0..FRAMES_PER_POLL {
             let Some(frame) = bus.receive() else { break };
             match codec::decode(&frame) {
-                Ok(received) => self.take(&received.message, received.counter, now, bus),
+                Ok(received) => {
+                    planned |= self.take(&received.message, received.counter, now, bus, probe);
+                }
                 Err(error) => self.reject(error, &frame),
             }
         }
+        probe.end(Phase::Decode);
         self.guard(now);
-        self.report(now, bus);
+        // Not beside planning, so that a call is never long for both; unless an operator asks so fast
+        // that the answers pile up.
+        if !planned || self.controller.answers_waiting() > MAX_ANSWERS_WAITING {
+            self.report(now, bus);
+        }
+        probe.end(Phase::Report);
     }
 
-    fn take<B: Bus>(&mut self, message: &Message, counter: Option<u8>, now: u64, bus: &mut B) {
+    /// Acts on a message; returns whether it has led to planning.
+    fn take<B: Bus, P: Probe>(
+        &mut self,
+        message: &Message,
+        counter: Option<u8>,
+        now: u64,
+        bus: &mut B,
+        probe: &mut P,
+    ) -> bool {
         let counter = counter.unwrap_or(0);
         match message {
             Message::Feedback(feedback) => {
                 let verdict = self.feedback.judge(counter);
                 if self.admit(verdict) {
                     self.bad_feedback = 0;
-                    self.sample(feedback, now, bus);
-                } else {
-                    self.suspect(Cause::Reordered);
+                    return self.sample(feedback, now, bus, probe);
                 }
+                self.suspect(Cause::Reordered);
             }
             Message::Motion(motion) => {
                 let verdict = self.motion.judge(counter);
@@ -153,10 +179,19 @@ impl Node {
             // What other nodes tell each other, or the operator.
             _ => {}
         }
+        false
     }
 
-    /// One control sample: the only place where the control moves on.
-    fn sample<B: Bus>(&mut self, feedback: &Feedback, now: u64, bus: &mut B) {
+    /// One control sample: the only place where the control moves on. Returns whether a move was
+    /// planned on.
+    fn sample<B: Bus, P: Probe>(
+        &mut self,
+        feedback: &Feedback,
+        now: u64,
+        bus: &mut B,
+        probe: &mut P,
+    ) -> bool {
+        probe.end(Phase::Decode);
         let steps = match self.newest {
             None => 1,
             Some((last, _)) => feedback.sample.wrapping_sub(last).max(1),
@@ -167,13 +202,14 @@ impl Node {
         }
         let rated = self.controller.arm().drive.motor_torque_rated * 1e-3;
         let [t1, t2, t3, t4] = feedback.torque.map(f32::from);
-        let actions = self.controller.step(&Readings {
+        let readings = Readings {
             steps,
             status: feedback.status,
             counts: feedback.position,
             speed: Vector4::from(feedback.velocity),
             torque: Vector4::new(t1, t2, t3, t4).component_mul(&rated),
-        });
+        };
+        let actions = self.controller.step(&readings, probe);
         let command = Command {
             sample: feedback.sample,
             control: actions.control,
@@ -182,7 +218,12 @@ impl Node {
         let counter = self.sequence.command;
         self.sequence.command = counter.wrapping_add(1);
         self.send(&Message::Command(command), counter, bus);
-        self.controller.plan();
+        probe.end(Phase::Encode);
+        // Now that the command is on its way. By the number of the sample and not by the time, so
+        // that the same feedback gives the same torques whenever it comes.
+        let planned = !feedback.sample.is_multiple_of(REPORT_SAMPLES) && self.controller.plan();
+        probe.end(Phase::Planning);
+        planned
     }
 
     fn motion(&mut self, motion: &Motion, verdict: Verdict) {
@@ -268,9 +309,10 @@ impl Node {
         }
     }
 
-    /// What is due: replies, an emergency, state and heartbeat.
+    /// What is due: a reply, an emergency, state and heartbeat.
     fn report<B: Bus>(&mut self, now: u64, bus: &mut B) {
-        while let Some(reply) = self.controller.take_reply() {
+        // One a call: requests that are refused together are answered sample by sample.
+        if let Some(reply) = self.controller.take_reply() {
             let counter = self.sequence.reply;
             self.sequence.reply = counter.wrapping_add(1);
             self.send(&Message::MotionReply(reply), counter, bus);

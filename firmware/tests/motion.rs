@@ -46,17 +46,16 @@ fn plan(
     let capacity = Capacity { arm, body: &body };
     let mut planner = Planner::new();
     planner.begin(
-        arm,
         &Request {
             sequence: 1,
             target,
             speed,
         },
         from,
-    )?;
+    );
     for _ in 0..Planner::MAX_STEPS {
         if let Some(result) = planner.work(&capacity) {
-            return result;
+            return result.map(|()| *planner.trajectory());
         }
     }
     panic!("not planned within {} steps", Planner::MAX_STEPS)

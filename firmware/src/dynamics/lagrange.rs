@@ -217,15 +217,29 @@ impl Lagrange {
     #[must_use]
     pub fn inverse(&self, trig: &Trig, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
         let couplings = self.couplings(trig);
-        let Couplings { k12, k14, k24, .. } = couplings;
+        let planar =
+            self.planar_inertial(&couplings, qdd) + centrifugal(&couplings, &absolute_rates(qd));
+        joint_efforts(&planar, self.lift_mass * qdd.z - self.weight)
+    }
+
+    /// Inertial efforts M qdd (N m, lift N).
+    #[must_use]
+    pub fn inertial(&self, trig: &Trig, qdd: &Vector4<f32>) -> Vector4<f32> {
+        joint_efforts(
+            &self.planar_inertial(&self.couplings(trig), qdd),
+            self.lift_mass * qdd.z,
+        )
+    }
+
+    /// Inertial terms of the three equations in absolute rates.
+    fn planar_inertial(&self, couplings: &Couplings, qdd: &Vector4<f32>) -> Vector3<f32> {
+        let Couplings { k12, k14, k24, .. } = *couplings;
         let w = absolute_rates(qdd);
-        let inertial = Vector3::new(
+        Vector3::new(
             self.inertia.x * w.x + k12 * w.y + k14 * w.z,
             k12 * w.x + self.inertia.y * w.y + k24 * w.z,
             k14 * w.x + k24 * w.y + self.inertia.z * w.z,
-        );
-        let planar = inertial + centrifugal(&couplings, &absolute_rates(qd));
-        joint_efforts(&planar, self.lift_mass * qdd.z - self.weight)
+        )
     }
 
     /// Forward dynamics: joint accelerations under the efforts `tau` (rad/s^2, lift m/s^2).

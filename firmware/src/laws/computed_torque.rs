@@ -16,12 +16,13 @@ pub fn torque(
     compensation: Compensation,
     memory: &mut Memory,
 ) -> Vector4<f32> {
-    let error = situation.position_error();
-    let mut acceleration = situation.ahead.qdd
-        + situation.velocity_error() * gains.derivative()
+    let motion = situation.motion;
+    let error = motion.position_error();
+    let mut acceleration = motion.ahead_qdd
+        + motion.velocity_error() * gains.derivative()
         + error * gains.proportional();
     if compensation == Compensation::Integral {
-        acceleration += memory.integrate(&error, situation) * gains.integral();
+        acceleration += memory.integrate(&error, motion) * gains.integral();
     }
     realise(situation, &acceleration, gains, compensation, memory)
 }
@@ -35,21 +36,10 @@ pub(super) fn realise(
     compensation: Compensation,
     memory: &mut Memory,
 ) -> Vector4<f32> {
-    let body = situation.body;
-    let mass = body.mass_matrix(situation.trig);
-    let gravity = body.lagrange.gravity();
-    // Friction of the planned motion: that of the measured one would chatter around rest.
-    let friction = body.drive.friction(&situation.ahead.qd);
-    let bias = body
-        .lagrange
-        .bias(situation.trig, &situation.velocity_ahead());
-    let torque = mass * acceleration + bias + gravity + friction;
+    let Situation { motion, model, .. } = *situation;
+    let torque = &model.mass * acceleration + model.bias + model.gravity + model.friction;
     if compensation == Compensation::Observer {
-        let known = gravity + friction;
-        let disturbance = memory
-            .observer
-            .update(situation, &mass, &known, gains.observer);
-        torque - disturbance
+        torque - memory.observer.update(motion, model, gains.observer)
     } else {
         torque
     }

@@ -8,6 +8,7 @@ use super::{Gains, Memory, Situation, velocity_loop};
 
 /// Joint torques of the velocity loop that follows the law's velocities.
 pub fn torque(situation: &Situation<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
-    let command = situation.mean_qd + situation.position_error() * velocity_loop::outer_gain(gains);
+    let motion = situation.motion;
+    let command = motion.mean_qd + motion.position_error() * velocity_loop::outer_gain(gains);
     velocity_loop::torque(&command, situation, gains, memory)
 }

@@ -1,6 +1,6 @@
 //! The control laws of the paper, corrected, one file each, selectable at run time.
 //!
-//! | law | paper | what it needs |
+//! | law | paper | what it uses |
 //! |---|---|---|
 //! | [`kinematic_joint`] | kinematic control, joint space | inner velocity loop |
 //! | [`kinematic_task`] | kinematic control, task space | Jacobian, inner velocity loop |
@@ -19,17 +19,15 @@ pub mod kinematic_task;
 pub mod observer;
 pub mod pd_gravity;
 pub mod pid;
+mod situation;
 mod velocity_loop;
 
 use nalgebra::Vector4;
 use protocol::messages::{Compensation, Law, Refusal, RefusalReason};
 use serde::{Deserialize, Serialize};
 
-use crate::arm::ArmModel;
-use crate::body::Body;
-use crate::kinematics::Trig;
-use crate::trajectory::Reference;
 use observer::MomentumObserver;
+pub use situation::{Model, Motion, Situation, Task};
 
 /// Largest damping ratio an operator may ask for.
 const MAX_DAMPING: f32 = 5.0;
@@ -92,50 +90,6 @@ impl Gains {
     }
 }
 
-/// What a law sees in one sample.
-#[derive(Clone, Copy, Debug)]
-pub struct Situation<'a> {
-    /// The robot.
-    pub arm: &'a ArmModel,
-    /// Its dynamics with the payload as announced.
-    pub body: &'a Body,
-    /// Sines and cosines of the measured position.
-    pub trig: &'a Trig,
-    /// Measured joint positions.
-    pub q: Vector4<f32>,
-    /// Measured joint velocities: means over the last sample, so half a sample old.
-    pub qd: Vector4<f32>,
-    /// Measured joint torques, means over the last sample.
-    pub torque: Vector4<f32>,
-    /// Reference at the sampling instant.
-    pub reference: Reference,
-    /// Reference velocity through the same filter as `qd`: compared with it without a delay.
-    pub mean_qd: Vector4<f32>,
-    /// Reference at the middle of the time in which the command will act.
-    pub ahead: Reference,
-    /// Sampling period, s.
-    pub period: f32,
-    /// Sign of the axes whose torque was cut in the last sample, 0 where none was.
-    pub saturated: Vector4<f32>,
-}
-
-impl Situation<'_> {
-    /// Position error at the sampling instant.
-    pub fn position_error(&self) -> Vector4<f32> {
-        self.reference.q - self.q
-    }
-
-    /// Measured velocity, brought forward by what the reference gains in the meantime.
-    pub fn velocity_ahead(&self) -> Vector4<f32> {
-        self.qd + (self.ahead.qd - self.mean_qd)
-    }
-
-    /// Velocity error over the last sample.
-    pub fn velocity_error(&self) -> Vector4<f32> {
-        self.mean_qd - self.qd
-    }
-}
-
 /// What a law remembers between samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Memory {
@@ -155,12 +109,12 @@ impl Memory {
     /// Adds `error` over one sample, except where the axis is saturated in that direction
     /// (clamping anti-windup, Åström & Hägglund, *Advanced PID Control*, section 3.5). Returns
     /// the integral.
-    fn integrate(&mut self, error: &Vector4<f32>, situation: &Situation<'_>) -> Vector4<f32> {
-        let winds_up = situation.saturated.component_mul(error).map(|x| x > 0.0);
+    fn integrate(&mut self, error: &Vector4<f32>, motion: &Motion<'_>) -> Vector4<f32> {
+        let winds_up = motion.excess.component_mul(error).map(|x| x > 0.0);
         self.integral += error.zip_map(
             &winds_up,
             |e, stop| {
-                if stop { 0.0 } else { e * situation.period }
+                if stop { 0.0 } else { e * motion.period }
             },
         );
         self.integral

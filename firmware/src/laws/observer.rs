@@ -6,9 +6,9 @@
 //! with corner K. It needs no acceleration and, since it counts the torque that the drives report
 //! and not the one that was asked for, it does not wind up when an axis saturates.
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::Vector4;
 
-use super::Situation;
+use super::{Model, Motion};
 
 /// State of the observer.
 #[derive(Clone, Copy, Debug)]
@@ -33,33 +33,23 @@ impl MomentumObserver {
 
     /// Estimated disturbance at the joints after one more sample, positive along +q.
     ///
-    /// `mass` is the inertia matrix with rotors, `known` gravity plus friction. The corner is
-    /// bounded to half a radian a sample, where the discrete filter still behaves like the
-    /// continuous one.
-    pub fn update(
-        &mut self,
-        situation: &Situation<'_>,
-        mass: &Matrix4<f32>,
-        known: &Vector4<f32>,
-        corner: f32,
-    ) -> Vector4<f32> {
-        let period = situation.period;
-        let momentum = mass * situation.qd;
+    /// The corner is bounded to half a radian a sample, where the discrete filter still behaves
+    /// like the continuous one.
+    pub fn update(&mut self, motion: &Motion<'_>, model: &Model, corner: f32) -> Vector4<f32> {
+        let period = motion.period;
+        let momentum = &model.mass * &motion.qd;
         if !self.started {
             self.started = true;
             self.expected = momentum;
-            self.previous_torque = situation.torque;
+            self.previous_torque = motion.torque;
             return self.residual;
         }
         // Velocities are means over a sample and stand for its middle: between two of them act
         // the second half of one torque sample and the first half of the next.
-        let torque = 0.5 * (situation.torque + self.previous_torque);
-        self.previous_torque = situation.torque;
-        let coriolis = situation
-            .body
-            .lagrange
-            .kinetic_gradient(situation.trig, &situation.qd);
-        self.expected += (torque + coriolis - known + self.residual) * period;
+        let torque = 0.5 * (motion.torque + self.previous_torque);
+        self.previous_torque = motion.torque;
+        let known = model.gravity + model.friction;
+        self.expected += (torque + model.kinetic_gradient - known + self.residual) * period;
         let corner = corner.min(0.5 / period);
         self.residual = (momentum - self.expected) * corner;
         self.residual

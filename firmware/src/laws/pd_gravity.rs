@@ -10,7 +10,8 @@ use super::{Gains, Situation};
 
 /// Joint torques; the gain matrices are nominal inertias times Kp and Kd.
 pub fn torque(situation: &Situation<'_>, gains: &Gains) -> Vector4<f32> {
-    let acceleration = situation.position_error() * gains.proportional()
-        + situation.velocity_error() * gains.derivative();
-    situation.body.nominal_inertia.component_mul(&acceleration) + situation.body.lagrange.gravity()
+    let motion = situation.motion;
+    let acceleration = motion.position_error() * gains.proportional()
+        + motion.velocity_error() * gains.derivative();
+    situation.nominal_inertia.component_mul(&acceleration) + situation.model.gravity
 }

@@ -7,10 +7,11 @@ use super::{Gains, Memory, Situation};
 
 /// Joint torques: nominal inertia times (Kp e + Ki integral e + Kd e').
 pub fn torque(situation: &Situation<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
-    let error = situation.position_error();
-    let integral = memory.integrate(&error, situation);
+    let motion = situation.motion;
+    let error = motion.position_error();
+    let integral = memory.integrate(&error, motion);
     let acceleration = error * gains.proportional()
-        + situation.velocity_error() * gains.derivative()
+        + motion.velocity_error() * gains.derivative()
         + integral * gains.integral();
-    situation.body.nominal_inertia.component_mul(&acceleration)
+    situation.nominal_inertia.component_mul(&acceleration)
 }

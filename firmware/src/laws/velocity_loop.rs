@@ -15,10 +15,10 @@ pub(super) fn torque(
     memory: &mut Memory,
 ) -> Vector4<f32> {
     let gain = gains.derivative();
-    let error = command - situation.qd;
-    let integral = memory.integrate(&error, situation);
+    let error = command - situation.motion.qd;
+    let integral = memory.integrate(&error, situation.motion);
     let acceleration = error * gain + integral * (0.25 * gain * gain);
-    situation.body.nominal_inertia.component_mul(&acceleration) + situation.body.lagrange.gravity()
+    situation.nominal_inertia.component_mul(&acceleration) + situation.model.gravity
 }
 
 /// Position gain of a kinematic law around this loop, 1/s: a quarter of the inner bandwidth, so

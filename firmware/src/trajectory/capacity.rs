@@ -13,7 +13,7 @@ use crate::math::{cbrt, clamp, sqrt};
 
 /// Share of the torque that a plan may use. The rest is for the feedback: payload and friction
 /// are never known exactly, and a saturated axis leaves the path.
-pub const TORQUE_SHARE: f32 = 0.92;
+pub const TORQUE_SHARE: f32 = 0.93;
 
 /// The limits of one arm with one payload, as the planner uses them.
 #[derive(Clone, Copy, Debug)]
@@ -28,12 +28,15 @@ impl Capacity<'_> {
     /// By what factor the path acceleration of `along` could grow before the first joint torque
     /// reaches its share; huge where the sample needs hardly any.
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
+        let Self { arm, body } = self;
         let trig = Trig::new(&here.q);
         let qd = here.dq * along.v;
-        let push = self.body.mass_matrix(&trig) * here.dq * along.a;
-        let rest = self
-            .body
-            .inverse(&trig, &qd, &(here.ddq * (along.v * along.v)));
+        let push = body.inertial(&trig, &(here.dq * along.a));
+        let rest = body.inertial(&trig, &(here.ddq * (along.v * along.v)))
+            + body.lagrange.bias(&trig, &qd)
+            + body.lagrange.gravity()
+            + arm.drive.viscous.component_mul(&qd)
+            + body.drive.coulomb_friction(&qd);
         let mut room = f32::MAX;
         for ((push, rest), limit) in push.iter().zip(rest.iter()).zip(self.torque().iter()) {
             let (need, rest) = if *push < 0.0 {
@@ -49,56 +52,98 @@ impl Capacity<'_> {
         room
     }
 
-    /// The largest time scale, at most 1, at which `reference` keeps every limit; of the limits
-    /// of speed, acceleration and jerk only `share`.
+    /// Whether the arm can creep: hold its weight against friction in either direction.
     ///
     /// # Errors
-    /// [`RefusalReason::OutOfRange`] with the axis and torque that not even rest can hold.
-    pub fn time_scale(&self, reference: &Reference, share: f32) -> Result<f32, Refusal> {
+    /// [`RefusalReason::TorqueTooSmall`] with the axis and torque that no time scale makes less.
+    pub fn check_creep(&self) -> Result<(), Refusal> {
+        let torque = self.body.lagrange.gravity().abs() + self.arm.drive.coulomb;
+        let (joint, motor) = self.torque_limits();
+        let refuse = |axis: Axis, value: f32, limit: f32| {
+            Err(Refusal {
+                reason: RefusalReason::TorqueTooSmall,
+                axis: axis as u8,
+                value,
+                limit,
+            })
+        };
+        for ((axis, value), limit) in Axis::ALL.into_iter().zip(torque.iter()).zip(joint.iter()) {
+            if value > limit {
+                return refuse(axis, *value, *limit);
+            }
+        }
+        let lift = Vector4::new(0.0, 0.0, torque.z, 0.0);
+        let wrist = Vector4::new(0.0, 0.0, 0.0, torque.w);
+        let value = self.wrist_motor(&lift).abs() + self.wrist_motor(&wrist).abs();
+        if value > motor {
+            return refuse(Axis::Wrist, value, motor);
+        }
+        Ok(())
+    }
+
+    /// The largest time scale, at most 1, at which `reference` keeps the torque limits of joints and
+    /// motors, of an arm that [can creep](Self::check_creep).
+    pub fn torque_scale(&self, reference: &Reference) -> f32 {
         let Self { arm, body } = self;
         let trig = Trig::new(&reference.q);
         let (qd, qdd) = (&reference.qd, &reference.qdd);
-        // tau(x) = quadratic x² + linear x + constant. Coulomb friction does not fade with x.
-        let quadratic = body.mass_matrix(&trig) * qdd + body.lagrange.bias(&trig, qd);
-        let linear = arm.drive.viscous.component_mul(qd);
-        let constant = body.lagrange.gravity() + body.drive.friction(qd) - linear;
-        let drive = &body.drive;
-        let joint_limit = self.torque();
-        let motor_limit = arm.drive.motor_torque_limit * TORQUE_SHARE;
-        let full = quadratic + linear + constant;
-        // Nearly every sample keeps its limits as it is and at rest: then there is nothing to solve.
-        let keeps = within(&full, &joint_limit)
-            && within(&constant, &joint_limit)
-            && within(&drive.motor_torque(&full), &motor_limit)
-            && within(&drive.motor_torque(&constant), &motor_limit);
-        let torque = if keeps {
-            1.0
-        } else {
-            let joint = torque_scale(&quadratic, &linear, &constant, &joint_limit)?;
-            let motor = torque_scale(
-                &drive.motor_torque(&quadratic),
-                &drive.motor_torque(&linear),
-                &drive.motor_torque(&constant),
-                &motor_limit,
-            )?;
-            joint.min(motor)
-        };
-        let limits = &arm.limits;
-        let share = |limit: &Vector4<f32>| limit * share;
-        let speed = ratio(&share(&limits.velocity), qd).min(ratio(
-            &share(&arm.drive.motor_speed_limit),
-            &drive.motor_speed(qd),
-        ));
-        let acceleration = ratio(&share(&limits.acceleration), qdd);
-        let jerk = ratio(&share(&limits.jerk), &reference.qddd);
-        let mut scale = torque.min(speed);
+        // tau(x) = a x² + b x + c. Coulomb friction does not fade with x.
+        let a = body.inertial(&trig, qdd) + body.lagrange.bias(&trig, qd);
+        let b = arm.drive.viscous.component_mul(qd);
+        let c = body.lagrange.gravity() + body.drive.coulomb_friction(qd);
+        let full = a + b + c;
+        let (joint, motor) = self.torque_limits();
+        // Nearly every sample keeps its limits as it is: then there is nothing to solve.
+        if within(&full, &joint) && self.wrist_motor(&full).abs() <= motor {
+            return 1.0;
+        }
+        let wrist = |torque: &Vector4<f32>| self.wrist_motor(torque);
+        scale_within(a.x, b.x, c.x, joint.x)
+            .min(scale_within(a.y, b.y, c.y, joint.y))
+            .min(scale_within(a.z, b.z, c.z, joint.z))
+            .min(scale_within(a.w, b.w, c.w, joint.w))
+            .min(scale_within(wrist(&a), wrist(&b), wrist(&c), motor))
+    }
+
+    /// Torques that a plan may use: of the joints, as they and the motors that turn one joint each allow, and of the motor of
+    /// the wrist, which carries part of the lift's force, too.
+    fn torque_limits(&self) -> (Vector4<f32>, f32) {
+        let motor = self.arm.drive.motor_torque_limit * TORQUE_SHARE;
+        let own = self.body.drive.own_torque(&motor).abs();
+        (self.torque().inf(&own), motor.w)
+    }
+
+    fn wrist_motor(&self, torque: &Vector4<f32>) -> f32 {
+        self.body.drive.motor_torque(torque).w
+    }
+
+    /// The largest time scale, at most 1, at which the motor of the lift, which also turns with the wrist, keeps its speed
+    /// limit.
+    pub fn lift_motor_scale(&self, qd: &Vector4<f32>) -> f32 {
+        let speed = self.body.drive.motor_speed(qd).z.abs();
+        let limit = self.arm.drive.motor_speed_limit.z;
+        if speed > limit { limit / speed } else { 1.0 }
+    }
+
+    /// The largest time scale, at most 1, at which `reference` uses no more than `share` of the limits
+    /// of speed, acceleration and jerk.
+    pub fn rate_scale(&self, reference: &Reference, share: f32) -> f32 {
+        let limits = &self.arm.limits;
+        let speed = ratio(&(limits.velocity * share), &reference.qd);
+        let motor = ratio(
+            &(self.arm.drive.motor_speed_limit * share),
+            &self.body.drive.motor_speed(&reference.qd),
+        );
+        let acceleration = ratio(&(limits.acceleration * share), &reference.qdd);
+        let jerk = ratio(&(limits.jerk * share), &reference.qddd);
+        let mut scale = speed.min(motor);
         if acceleration < 1.0 {
             scale = scale.min(sqrt(acceleration));
         }
         if jerk < 1.0 {
             scale = scale.min(cbrt(jerk));
         }
-        Ok(scale)
+        scale
     }
 
     /// Largest joint speeds: the joint's own limit or the motor's, whichever is lower.
@@ -163,44 +208,21 @@ fn ratio(limit: &Vector4<f32>, value: &Vector4<f32>) -> f32 {
     least
 }
 
-fn torque_scale(
-    quadratic: &Vector4<f32>,
-    linear: &Vector4<f32>,
-    constant: &Vector4<f32>,
-    limit: &Vector4<f32>,
-) -> Result<f32, Refusal> {
-    let mut scale = 1.0f32;
-    for ((((axis, a), b), c), limit) in Axis::ALL
-        .into_iter()
-        .zip(quadratic.iter())
-        .zip(linear.iter())
-        .zip(constant.iter())
-        .zip(limit.iter())
-    {
-        let upward = largest_scale(*a, *b, limit - c);
-        let downward = largest_scale(-a, -b, limit + c);
-        let (Some(upward), Some(downward)) = (upward, downward) else {
-            return Err(Refusal {
-                reason: RefusalReason::TorqueTooSmall,
-                axis: axis as u8,
-                value: *c,
-                limit: *limit,
-            });
-        };
-        scale = scale.min(upward).min(downward);
+/// Largest `x`, at most 1, with `a x² + b x + c` within the limit.
+fn scale_within(a: f32, b: f32, c: f32, limit: f32) -> f32 {
+    let full = a + b + c;
+    if full > limit {
+        largest_scale(a, b, limit - c)
+    } else if full < -limit {
+        largest_scale(-a, -b, limit + c)
+    } else {
+        1.0
     }
-    Ok(scale)
 }
 
-/// Largest `x` in 0..=1 with `a x² + b x <= room`; `None` where even rest is beyond the limit.
-fn largest_scale(a: f32, b: f32, room: f32) -> Option<f32> {
-    if room <= 0.0 {
-        return None;
-    }
-    if a + b <= room {
-        return Some(1.0);
-    }
-    // The positive root in the form that does not cancel; a + b > room > 0 makes it real.
+/// The positive root of `a x² + b x = room`, for a + b > room >= 0.
+fn largest_scale(a: f32, b: f32, room: f32) -> f32 {
+    // In the form that does not cancel. For a < 0, b > room - a makes the discriminant positive.
     let root = sqrt((b * b + 4.0 * a * room).max(0.0));
-    Some((2.0 * room / (b + root)).min(1.0))
+    (2.0 * room / (b + root)).min(1.0)
 }

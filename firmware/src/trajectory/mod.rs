@@ -19,8 +19,8 @@ pub mod request;
 use nalgebra::Vector4;
 
 use crate::arm::ArmModel;
-use path::{Path, PathError};
-use profile::SCurve;
+use path::{Path, PathError, PathPoint};
+use profile::{SCurve, Sample};
 
 /// Where the arm should be: joint positions and their first three time derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,15 +95,25 @@ impl Trajectory {
     /// A line that the planner has not surveyed may leave the reach; a planned one cannot.
     pub fn at(&self, arm: &ArmModel, t: f32) -> Result<Reference, PathError> {
         let t = t * self.rate;
-        let along = self.profile.at(t - self.start);
-        let point = self.path.at(arm, along.s)?;
-        let (v, a, j) = (along.v, along.a, along.j);
-        let mut reference = Reference {
-            q: point.q,
-            qd: point.dq * v,
-            qdd: point.dq * a + point.ddq * (v * v),
-            // The third path derivative is left out: it feeds only the sub-sample extrapolation.
-            qddd: point.dq * j + point.ddq * (3.0 * v * a),
+        let Sample { s, v, a, j } = self.profile.at(t - self.start);
+        let mut reference = match &self.path {
+            // As below, without what is zero: nearly every move is one of these.
+            Path::Joint { start, delta } => Reference {
+                q: start + delta * s,
+                qd: delta * v,
+                qdd: delta * a,
+                qddd: delta * j,
+            },
+            path @ Path::Line { .. } => {
+                let PathPoint { q, dq, ddq } = path.at(arm, s)?;
+                Reference {
+                    q,
+                    qd: dq * v,
+                    qdd: dq * a + ddq * (v * v),
+                    // The third path derivative is left out: it feeds only the sub-sample extrapolation.
+                    qddd: dq * j + ddq * (3.0 * v * a),
+                }
+            }
         };
         if let Some(lift) = &self.lift {
             let up = lift.up.at(t);

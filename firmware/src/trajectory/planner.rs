@@ -1,11 +1,12 @@
 //! From a request to a trajectory, one bounded step at a time.
 //!
 //! ```text
-//! Survey --> Stroke x 2 --> Compose --> Balance --> Compose --> Verify --> Trajectory
-//!   | reach,   (jumps:        ^           |           | one time scale that keeps
-//!   | limits,   the lift)     +-- rounds--+           | every sample inside every limit
-//!   | speeds                   S-curve whose accelerations fill the torque limits
-//!   +--------------------------------------> Refusal (reason, axis, value, limit)
+//! Locate --> Survey --> Stroke, Clear --> Compose --> Balance --> Compose --> Verify --> Finish
+//!   | path     | reach,    (jumps: both     ^            |           | one time scale that keeps
+//!   |          | limits,    vertical         +-- rounds --+           | every sample inside every
+//!   |          | speeds     parts)         S-curve whose accelerations | limit
+//!   |          |                           fill the torque limits
+//!   +----------+----------------------------------------> Refusal (reason, axis, value, limit)
 //! ```
 //!
 //! Constant joint acceleration limits would waste half of the robot: what bounds a SCARA is motor
@@ -21,19 +22,21 @@ use protocol::messages::{Refusal, RefusalReason};
 
 use super::capacity::Capacity;
 use super::path::{Path, PathPoint, check_limits};
-use super::profile::{Bounds, SCurve};
-use super::request::{Gate, Request, from_ik, from_path};
+use super::profile::{Bounds, SCurve, Sample};
+use super::request::{Gate, Request, Target, from_ik, from_path};
 use super::{Lift, Trajectory};
 use crate::arm::ArmModel;
 
 /// Points of the survey of a line.
 const SURVEY_POINTS: u8 = 24;
 /// Corrections of the two accelerations.
-const ROUNDS: u8 = 4;
+const ROUNDS: u8 = 3;
 /// Samples of each half of the profile in one round.
-const BALANCE_POINTS: u8 = 8;
-/// Samples of the last pass.
-const VERIFY_POINTS: u8 = 80;
+const BALANCE_POINTS: u8 = 3;
+/// Steps of the last pass, at the most, between the borders of segments; along a line more, since there the joints have
+/// extremes of their own.
+const JOINT_STEPS: u8 = 20;
+const LINE_STEPS: u8 = 40;
 /// Share of the limits of speed, acceleration and jerk that the samples of a line may use.
 const LINE_SHARE: f32 = 0.9;
 /// A correction of an acceleration by more than this factor waits for the next round.
@@ -45,12 +48,18 @@ const NO_TRAVEL: f32 = 1e-6;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Idle,
+    /// Path to the target.
+    Locate,
     Survey {
         point: u8,
         fastest: Vector4<f32>,
     },
     /// One vertical stroke of a jump.
     Stroke {
+        down: bool,
+    },
+    /// When that stroke passes the clearance.
+    Clear {
         down: bool,
     },
     /// Profile from the bounds, after this many corrections.
@@ -63,9 +72,15 @@ enum Stage {
         gain: [f32; 2],
     },
     Verify {
-        point: u8,
+        /// Time of the sample, s.
+        t: f32,
         rate: f32,
-        before: Option<Vector4<f32>>,
+        /// Time and acceleration of the sample before.
+        before: Option<(f32, Vector4<f32>)>,
+    },
+    /// All samples are seen.
+    Finish {
+        rate: f32,
     },
 }
 
@@ -75,6 +90,7 @@ pub struct Planner {
     stage: Stage,
     draft: Trajectory,
     bounds: Bounds,
+    target: Target,
     speed: f32,
     /// Heights of a jump.
     gate: Option<Gate>,
@@ -85,12 +101,15 @@ pub struct Planner {
 impl Planner {
     /// Calls of [`Planner::work`] after which a plan is complete or refused.
     pub const MAX_STEPS: u32 = {
+        let locate = 1;
         let survey = SURVEY_POINTS as u32 + 1;
-        let strokes = 2;
+        let strokes = 4;
         let compose = ROUNDS as u32 + 1;
         let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
-        let verify = VERIFY_POINTS as u32 + 1;
-        survey + strokes + compose + balance + verify
+        // Its ends, and the borders of three profiles of seven segments.
+        let verify = LINE_STEPS as u32 + 2 + 3 * 8;
+        let finish = 1;
+        locate + survey + strokes + compose + balance + verify + finish
     };
 
     /// An idle planner.
@@ -117,6 +136,7 @@ impl Planner {
                 brake: 1.0,
                 jerk: 1.0,
             },
+            target: Target::Joints(Vector4::zeros()),
             speed: 1.0,
             gate: None,
             blended: 0.0,
@@ -125,7 +145,7 @@ impl Planner {
 
     /// Whether no request is being planned.
     pub fn is_idle(&self) -> bool {
-        self.stage == Stage::Idle
+        matches!(self.stage, Stage::Idle)
     }
 
     /// Forgets the request at hand and returns its number.
@@ -141,37 +161,65 @@ impl Planner {
     }
 
     /// Takes a request for a move from the joint positions `from`.
-    ///
-    /// # Errors
-    /// A target that is not finite, out of reach or outside a limit is refused at once.
-    pub fn begin(
-        &mut self,
-        arm: &ArmModel,
-        request: &Request,
-        from: &Vector4<f32>,
-    ) -> Result<(), Refusal> {
-        self.stage = Stage::Idle;
-        if !(request.speed > 0.0 && request.speed <= 1.0) {
-            return Err(Refusal::value(
-                RefusalReason::OutOfRange,
-                request.speed,
-                1.0,
-            ));
-        }
-        let (path, gate) = request.target.path(arm, from)?;
-        self.gate = gate;
+    pub fn begin(&mut self, request: &Request, from: &Vector4<f32>) {
+        self.target = request.target;
         self.speed = request.speed;
-        self.draft = Trajectory {
-            path,
-            profile: SCurve::default(),
-            start: 0.0,
-            lift: None,
-            span: 0.0,
-            rate: 1.0,
-            braking: Vector4::zeros(),
-            end: *from,
-            sequence: request.sequence,
+        self.draft.sequence = request.sequence;
+        self.draft.end = *from;
+        self.stage = Stage::Locate;
+    }
+
+    /// One step of planning: one sample of the move, or one profile. When the plan is complete,
+    /// `Ok` says that [`Planner::trajectory`] is the one asked for, and `Err` why there is none.
+    pub fn work(&mut self, capacity: &Capacity<'_>) -> Option<Result<(), Refusal>> {
+        let step = match self.stage {
+            Stage::Idle => return None,
+            Stage::Locate => self.locate(capacity.arm),
+            Stage::Survey { point, fastest } => self.survey(capacity, point, fastest),
+            Stage::Stroke { down } => {
+                self.stroke(capacity, down);
+                Ok(())
+            }
+            Stage::Clear { down } => {
+                self.clear(down);
+                Ok(())
+            }
+            Stage::Compose { round } => {
+                self.compose(round);
+                Ok(())
+            }
+            Stage::Balance { round, point, gain } => self.balance(capacity, round, point, gain),
+            Stage::Verify { t, rate, before } => self.verify(capacity, t, rate, before),
+            Stage::Finish { rate } => self.finish(capacity, rate),
         };
+        if step.is_err() {
+            self.stage = Stage::Idle;
+        }
+        match step {
+            Ok(()) if !self.is_idle() => None,
+            done => Some(done),
+        }
+    }
+
+    /// What has been planned last.
+    pub fn trajectory(&self) -> &Trajectory {
+        &self.draft
+    }
+
+    /// The path to the target.
+    fn locate(&mut self, arm: &ArmModel) -> Result<(), Refusal> {
+        if !(self.speed > 0.0 && self.speed <= 1.0) {
+            return Err(Refusal::value(RefusalReason::OutOfRange, self.speed, 1.0));
+        }
+        let (path, gate) = self.target.path(arm, &self.draft.end)?;
+        self.gate = gate;
+        self.draft.path = path;
+        self.draft.start = 0.0;
+        self.draft.lift = None;
+        self.draft.rate = 1.0;
+        self.draft.braking = Vector4::zeros();
+        // Stands for a path on which nothing travels.
+        self.draft.profile = SCurve::default();
         self.stage = Stage::Survey {
             point: 0,
             fastest: Vector4::zeros(),
@@ -179,77 +227,41 @@ impl Planner {
         Ok(())
     }
 
-    /// One step of planning: one sample of the move, or one profile. Returns the trajectory or the
-    /// refusal when the plan is complete.
-    pub fn work(&mut self, capacity: &Capacity<'_>) -> Option<Result<Trajectory, Refusal>> {
-        let done = match self.stage {
-            Stage::Idle => return None,
-            Stage::Survey { point, fastest } => {
-                self.survey(capacity, point, fastest).map(|()| None)
-            }
-            Stage::Stroke { down } => {
-                self.stroke(capacity, down);
-                Ok(None)
-            }
-            Stage::Compose { round } => {
-                self.compose(round);
-                Ok(None)
-            }
-            Stage::Balance { round, point, gain } => {
-                self.balance(capacity, round, point, gain).map(|()| None)
-            }
-            Stage::Verify {
-                point,
-                rate,
-                before,
-            } => self.verify(capacity, point, rate, before),
-        };
-        let result = done.transpose()?;
-        self.stage = Stage::Idle;
-        Some(result)
-    }
-
-    /// Reach, limits and the largest joint travel per unit of path.
+    /// Reach, limits and the largest joint travel per unit of path; at the ends also the accelerations
+    /// from rest that torque allows, a start for the rounds.
     fn survey(
         &mut self,
         capacity: &Capacity<'_>,
         point: u8,
         fastest: Vector4<f32>,
     ) -> Result<(), Refusal> {
-        let s = f32::from(point) / f32::from(SURVEY_POINTS);
+        // A path straight in joint space lies between its ends.
+        let points = match self.draft.path {
+            Path::Joint { .. } => 1,
+            Path::Line { .. } => SURVEY_POINTS,
+        };
+        let s = f32::from(point) / f32::from(points);
         let here = self.point(capacity.arm, s)?;
         check_limits(capacity.arm, &here.q).map_err(from_ik)?;
+        let limits = &capacity.arm.limits;
         let fastest = fastest.sup(&here.dq.abs());
-        // A path straight in joint space lies between its ends, which are within the limits.
-        let last = matches!(self.draft.path, Path::Joint { .. }) || point >= SURVEY_POINTS;
-        if !last {
+        if point == 0 {
+            capacity.check_creep()?;
+            self.bounds.accelerate = self.acceleration_from_rest(capacity, &here);
+        }
+        if point < points {
             self.stage = Stage::Survey {
                 point: point + 1,
                 fastest,
             };
             return Ok(());
         }
-        let limits = &capacity.arm.limits;
-        let fill = |limit: &Vector4<f32>| {
-            limit
-                .iter()
-                .zip(fastest.iter())
-                .filter(|(_, travel)| **travel > NO_TRAVEL)
-                .map(|(limit, travel)| limit / travel)
-                .fold(f32::MAX, f32::min)
-        };
-        let speed = fill(&capacity.speed());
-        if speed == f32::MAX {
+        self.bounds.brake = self.acceleration_from_rest(capacity, &here);
+        self.bounds.jerk = fill(&limits.jerk, &fastest);
+        self.bounds.speed = fill(&capacity.speed(), &fastest);
+        if self.bounds.speed == f32::MAX {
             // Nothing travels along the path: at most the lift of a jump moves.
             self.bounds.speed = 0.0;
-        } else {
-            let acceleration = fill(&limits.acceleration);
-            self.bounds = Bounds {
-                speed,
-                accelerate: acceleration,
-                brake: acceleration,
-                jerk: fill(&limits.jerk),
-            };
         }
         self.stage = if self.gate.is_some() {
             Stage::Stroke { down: false }
@@ -257,6 +269,16 @@ impl Planner {
             Stage::Compose { round: 0 }
         };
         Ok(())
+    }
+
+    /// The path acceleration at which a joint at rest reaches its limit of torque or acceleration.
+    fn acceleration_from_rest(&self, capacity: &Capacity<'_>, here: &PathPoint) -> f32 {
+        let a = fill(&capacity.arm.limits.acceleration, &here.dq);
+        let along = Sample {
+            a,
+            ..Sample::default()
+        };
+        a * capacity.acceleration_room(here, &along).min(1.0)
     }
 
     /// One sample of one half; at the end of a round, new accelerations.
@@ -301,41 +323,77 @@ impl Planner {
         Ok(())
     }
 
-    /// One sample of the whole move; at the end, the trajectory. `before` is the acceleration of
-    /// the sample before.
+    /// One sample of the whole move.
     fn verify(
         &mut self,
         capacity: &Capacity<'_>,
-        point: u8,
+        t: f32,
         rate: f32,
-        before: Option<Vector4<f32>>,
-    ) -> Result<Option<Trajectory>, Refusal> {
-        let interval = self.draft.span / f32::from(VERIFY_POINTS);
-        let t = interval * f32::from(point);
+        before: Option<(f32, Vector4<f32>)>,
+    ) -> Result<(), Refusal> {
         let mut reference = self.draft.at(capacity.arm, t).map_err(from_path)?;
-        // Along a line the joint accelerations bend between the samples, and the jerk has a part
-        // that only their difference shows. Straight in joint space all of it is exact.
-        let curved = matches!(self.draft.path, Path::Line { .. });
-        if curved && let Some(before) = before {
-            reference.qddd = (reference.qdd - before) / interval;
+        let mut rate = rate.min(capacity.torque_scale(&reference));
+        if matches!(self.draft.path, Path::Line { .. }) {
+            // The joint accelerations bend between the samples, and the jerk has a part that only
+            // their difference shows.
+            if let Some((earlier, qdd)) = before {
+                reference.qddd = (reference.qdd - qdd) / (t - earlier);
+            }
+            rate = rate.min(capacity.rate_scale(&reference, LINE_SHARE));
+        } else {
+            // Each joint keeps its own limits by how its profile was made. Lift and wrist share a
+            // motor.
+            rate = rate.min(capacity.lift_motor_scale(&reference.qd));
         }
-        let share = if curved { LINE_SHARE } else { 1.0 };
-        let rate = rate.min(capacity.time_scale(&reference, share)?);
         self.draft.braking = self.draft.braking.sup(&reference.qdd.abs());
-        if point < VERIFY_POINTS {
-            self.stage = Stage::Verify {
-                point: point + 1,
+        self.stage = if t < self.draft.span {
+            Stage::Verify {
+                t: self.next_sample(t),
                 rate,
-                before: Some(reference.qdd),
-            };
-            return Ok(None);
-        }
-        let mut trajectory = self.draft;
+                before: Some((t, reference.qdd)),
+            }
+        } else {
+            Stage::Finish { rate }
+        };
+        Ok(())
+    }
+
+    /// Makes the trajectory of the draft.
+    fn finish(&mut self, capacity: &Capacity<'_>, rate: f32) -> Result<(), Refusal> {
         // Past the end, so that rounding of the last sample cannot leave the arm short of it.
-        trajectory.end = self.draft.at(capacity.arm, t + 1.0).map_err(from_path)?.q;
-        trajectory.braking *= rate * rate;
-        trajectory.rate = rate * self.speed;
-        Ok(Some(trajectory))
+        let past = self.draft.span + 1.0;
+        self.draft.end = self.draft.at(capacity.arm, past).map_err(from_path)?.q;
+        self.draft.braking *= rate * rate;
+        self.draft.rate = rate * self.speed;
+        self.stage = Stage::Idle;
+        Ok(())
+    }
+
+    /// Where the last pass looks after `t`, s: inertia changes along the way, and at the border of a segment torque is
+    /// often greatest.
+    fn next_sample(&self, t: f32) -> f32 {
+        let Trajectory {
+            path,
+            start,
+            profile,
+            lift,
+            span,
+            ..
+        } = &self.draft;
+        let steps = match path {
+            Path::Joint { .. } => JOINT_STEPS,
+            Path::Line { .. } => LINE_STEPS,
+        };
+        let step = span / f32::from(steps);
+        // A border next to the last sample is no news, and rounding must not keep the walk from going on.
+        let soon = t + 0.05 * step;
+        let mut next = (t + step).min(*span);
+        next = next.min(start + profile.border_after(soon - start));
+        if let Some(lift) = lift {
+            next = next.min(lift.up.border_after(soon));
+            next = next.min(lift.down_start + lift.down.border_after(soon - lift.down_start));
+        }
+        next
     }
 
     fn point(&self, arm: &ArmModel, s: f32) -> Result<PathPoint, Refusal> {
@@ -345,20 +403,13 @@ impl Planner {
     /// The joint accelerations' own limits, as a limit along the path.
     fn acceleration_ceiling(&self, arm: &ArmModel) -> f32 {
         match &self.draft.path {
-            Path::Joint { delta, .. } => arm
-                .limits
-                .acceleration
-                .iter()
-                .zip(delta.iter())
-                .filter(|(_, travel)| travel.abs() > NO_TRAVEL)
-                .map(|(limit, travel)| limit / travel.abs())
-                .fold(f32::MAX, f32::min),
+            Path::Joint { delta, .. } => fill(&arm.limits.acceleration, delta),
             // Varies along a line; the last pass sees to it.
             Path::Line { .. } => f32::MAX,
         }
     }
 
-    /// The profile of one vertical stroke, and when it passes the clearance.
+    /// The profile of one vertical stroke.
     fn stroke(&mut self, capacity: &Capacity<'_>, down: bool) {
         let (Some(gate), Path::Joint { start, .. }) = (self.gate, &self.draft.path) else {
             self.stage = Stage::Compose { round: 0 };
@@ -371,15 +422,26 @@ impl Planner {
             down: SCurve::default(),
             down_start: 0.0,
         });
-        self.stage = if down {
+        if down {
             lift.down = stroke(gate.fall, &down_bounds);
-            self.blended = lift.down.time_at(gate.fall - gate.clearance.min(gate.fall));
-            Stage::Compose { round: 0 }
         } else {
             lift.up = stroke(gate.rise, &up_bounds);
-            self.draft.start = lift.up.time_at(gate.clearance.min(gate.rise));
-            Stage::Stroke { down: true }
+        }
+        self.stage = Stage::Clear { down };
+    }
+
+    /// When one stroke passes the clearance.
+    fn clear(&mut self, down: bool) {
+        self.stage = Stage::Compose { round: 0 };
+        let (Some(gate), Some(lift)) = (self.gate, &self.draft.lift) else {
+            return;
         };
+        if down {
+            self.blended = lift.down.time_at(gate.fall - gate.clearance.min(gate.fall));
+        } else {
+            self.draft.start = lift.up.time_at(gate.clearance.min(gate.rise));
+            self.stage = Stage::Stroke { down: true };
+        }
     }
 
     /// Profile from the bounds, and how the strokes of a jump lie over it in time.
@@ -404,7 +466,7 @@ impl Planner {
             }
         } else {
             Stage::Verify {
-                point: 0,
+                t: 0.0,
                 rate: 1.0,
                 before: None,
             }
@@ -416,6 +478,17 @@ impl Default for Planner {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// The rate along the path at which the first joint reaches its limit, with the joints' travels per unit of path; huge
+/// where nothing travels.
+fn fill(limit: &Vector4<f32>, travel: &Vector4<f32>) -> f32 {
+    limit
+        .iter()
+        .zip(travel.iter())
+        .filter(|(_, travel)| travel.abs() > NO_TRAVEL)
+        .map(|(limit, travel)| limit / travel.abs())
+        .fold(f32::MAX, f32::min)
 }
 
 /// A profile over a length that may be nothing.

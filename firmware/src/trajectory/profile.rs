@@ -92,6 +92,21 @@ impl Half {
         2.0 * self.ramp + self.hold
     }
 
+    /// First border of two segments later than `t`, infinite from the end on. The ramps are of one length: it does not
+    /// matter from which end time runs.
+    fn border_after(&self, t: f32) -> f32 {
+        let held = self.ramp + self.hold;
+        if t < self.ramp {
+            self.ramp
+        } else if t < held {
+            held
+        } else if t < held + self.ramp {
+            held + self.ramp
+        } else {
+            f32::INFINITY
+        }
+    }
+
     /// Motion at `t` in `0..=duration`, from rest.
     fn at(&self, t: f32) -> Sample {
         let held = self.ramp + self.hold;
@@ -197,6 +212,21 @@ impl SCurve {
     /// Time at which braking begins, s.
     pub fn brake_start(&self) -> f32 {
         self.accelerate.duration() + self.cruise
+    }
+
+    /// First border of two segments later than `t`, s; infinite from the end on. At a border the motion is smooth, but
+    /// bends: what is greatest along a move is often greatest there.
+    pub fn border_after(&self, t: f32) -> f32 {
+        let (cruise, brake) = (self.accelerate_end(), self.brake_start());
+        if t < 0.0 {
+            0.0
+        } else if t < cruise {
+            self.accelerate.border_after(t)
+        } else if t < brake {
+            brake
+        } else {
+            brake + self.brake.border_after(t - brake)
+        }
     }
 
     /// Motion at `t`; before the start and after the end the coordinate rests at its ends.

@@ -100,6 +100,11 @@ impl MoveQueue {
         self.plan_end = *q;
     }
 
+    /// Whether there is a move to plan, and room for it.
+    pub fn has_to_plan(&self) -> bool {
+        self.is_planning() || !(self.requests.is_empty() || self.moves.is_full())
+    }
+
     /// One step of planning. Returns the number of a request and its answer, when it has one.
     pub fn plan(&mut self, capacity: &Capacity<'_>) -> Option<(u8, Result<(), Refusal>)> {
         if self.planner.is_idle() {
@@ -107,17 +112,18 @@ impl MoveQueue {
                 return None;
             }
             let request = self.requests.pop_front()?;
-            let begun = self.planner.begin(capacity.arm, &request, &self.plan_end);
-            return begun.err().map(|refusal| (request.sequence, Err(refusal)));
+            self.planner.begin(&request, &self.plan_end);
+            return None;
         }
         let planned = self.planner.work(capacity)?;
         let sequence = self.planner.sequence();
         Some((
             sequence,
-            planned.map(|trajectory| {
+            planned.map(|()| {
+                let trajectory = self.planner.trajectory();
                 self.plan_end = trajectory.end;
                 // There was room when the planner took the request.
-                let _ = self.moves.push_back(trajectory);
+                let _ = self.moves.push_back(*trajectory);
             }),
         ))
     }
@@ -141,7 +147,9 @@ impl MoveQueue {
         let t = self.clock.time(period);
         let ended = t >= trajectory.duration();
         // A verified path stays in reach; should arithmetic disagree, the arm holds.
-        let planned = trajectory.at(arm, t).unwrap_or(Reference::rest(*here));
+        let planned = trajectory
+            .at(arm, t)
+            .unwrap_or_else(|_| Reference::rest(*here));
         if stopping {
             self.clock
                 .brake(&planned, &trajectory.braking, &arm.limits, period);

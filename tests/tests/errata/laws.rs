@@ -3,7 +3,7 @@
 use firmware::arm::{ArmModel, DriveTrain, IRB_930};
 use firmware::body::Body;
 use firmware::kinematics::Trig;
-use firmware::laws::{Gains, Memory, Selection, Situation};
+use firmware::laws::{Gains, Memory, Model, Motion, Selection, Situation, Task};
 use firmware::trajectory::Reference;
 use nalgebra::Vector4;
 use protocol::messages::{Compensation, Law};
@@ -60,18 +60,23 @@ impl Controller {
             qdd: reference.qdd.cast(),
             qddd: Vector4::zeros(),
         };
-        let situation = Situation {
-            arm: &ARM,
-            body: &self.body,
-            trig: &Trig::new(&q),
+        let motion = Motion {
             q,
             qd: qd.cast(),
             torque: Vector4::zeros(),
-            reference,
+            reference: &reference,
             mean_qd: reference.qd,
-            ahead: reference,
+            ahead_qd: reference.qd,
+            ahead_qdd: reference.qdd,
             period: 1e-3,
-            saturated: Vector4::zeros(),
+            excess: Vector4::zeros(),
+        };
+        let trig = Trig::new(&q);
+        let situation = Situation {
+            motion: &motion,
+            task: &Task::new(&ARM.geometry, &trig, &motion),
+            model: &Model::new(&self.body, &trig, &motion),
+            nominal_inertia: &self.body.nominal_inertia,
         };
         self.selection.torque(&situation, &mut Memory::new()).cast()
     }

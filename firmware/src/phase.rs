@@ -1,0 +1,69 @@
+//! What a sample spends its time on, for a board that can measure it.
+//!
+//! Marks stand where one phase ends and the next begins, and nowhere else: what measures is the board's. With `()` for
+//! a probe they are no code at all.
+
+/// Part of a call of the node. They follow each other in this order; a call without a sample has the first and the last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Frames taken, checked and understood; requests judged.
+    Decode,
+    /// Readings, monitor, mode, and the reference of this sample.
+    Reference,
+    /// Sines, cosines, Jacobians and tool errors.
+    Kinematics,
+    /// Inertia, Coriolis, gravity and friction.
+    Dynamics,
+    /// The control law.
+    Law,
+    /// Torque limits.
+    Limits,
+    /// The command made a frame and handed to the bus.
+    Encode,
+    /// Steps of planning the next move.
+    Planning,
+    /// Watchdogs, replies and what is sent from time to time.
+    Report,
+}
+
+impl Phase {
+    /// Every phase, in order.
+    pub const ALL: [Self; 9] = [
+        Self::Decode,
+        Self::Reference,
+        Self::Kinematics,
+        Self::Dynamics,
+        Self::Law,
+        Self::Limits,
+        Self::Encode,
+        Self::Planning,
+        Self::Report,
+    ];
+
+    /// Name, as reports print it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Decode => "decode",
+            Self::Reference => "reference",
+            Self::Kinematics => "kinematics",
+            Self::Dynamics => "dynamics",
+            Self::Law => "law",
+            Self::Limits => "limits",
+            Self::Encode => "encode",
+            Self::Planning => "planning",
+            Self::Report => "report",
+        }
+    }
+}
+
+/// Is told of every end of a phase.
+pub trait Probe {
+    /// `phase` has ended; the time since the end before belongs to it.
+    fn end(&mut self, phase: Phase);
+}
+
+/// Measures nothing.
+impl Probe for () {
+    fn end(&mut self, _: Phase) {}
+}
