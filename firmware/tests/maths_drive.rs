@@ -65,6 +65,21 @@ proptest! {
         assert_close("torque", &back, &wide(&torque), &bound);
     }
 
+    /// tanh x and x cut to +-1 differ most at x = 1, by 1 - tanh 1 = 0.2384, and by less than 2 e^-2x beyond.
+    #[test]
+    fn coulomb_friction_of_plans_is_that_of_laws_away_from_rest(train in train(), qd in speed()) {
+        let drive = Drive::new(&train);
+        let (plan, law) = (drive.coulomb_friction(&qd), drive.friction(&qd) - train.viscous.component_mul(&qd));
+        for axis in 0..4 {
+            let x = f64::from(qd[axis] / train.coulomb_eps[axis]).abs();
+            let apart = 0.2385f64.min(2.0 * (-2.0 * x).exp() + 2e-6);
+            let rounding = 4.0 * U * f64::from((train.viscous[axis] * qd[axis]).abs());
+            let bound = apart * f64::from(train.coulomb[axis]) + rounding;
+            let gap = f64::from(plan[axis] - law[axis]).abs();
+            prop_assert!(gap <= bound, "axis {axis}: {gap} for {bound}");
+        }
+    }
+
     /// Gears neither make nor take power: motor torque times motor speed is joint effort times joint speed.
     #[test]
     fn power_is_conserved(train in train(), qd in speed(), torque in torque()) {

@@ -7,6 +7,7 @@ mod common;
 use common::magnitude::{self, LAGRANGE, NEWTON_EULER};
 use common::{U, acceleration, arm, assert_close, payload, position, speed};
 use firmware::arm::{ArmModel, Payload};
+use firmware::body::Body;
 use firmware::dynamics::lagrange::Lagrange;
 use firmware::dynamics::newton_euler;
 use firmware::kinematics::Trig;
@@ -46,6 +47,21 @@ fn assert_matrix_close(
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
+
+    /// What laws and planner multiply with, matrix or not, is links plus rotors.
+    #[test]
+    fn the_mass_of_the_body_is_that_of_links_and_rotors(
+        arm in arm(), payload in payload(), q in position(), qdd in acceleration(),
+    ) {
+        let body = Body::new(&arm, &payload);
+        let trig = Trig::new(&q);
+        let rotors = body.drive.rotor_inertia();
+        let expected = wide(&(Lagrange::new(&arm, &payload).mass_matrix(&trig) * qdd)) + wide(&(rotors * qdd));
+        let rotors = rotors.map(|x| f64::from(x.abs())) * wide(&qdd).abs();
+        let bound = (magnitude(&arm, &payload, 0.0, &Vector4::zeros(), &qdd) + rotors) * (2.0 * LAGRANGE * U);
+        assert_close("matrix", &(&body.mass_matrix(&trig) * &qdd), &expected, &bound);
+        assert_close("product", &body.inertial(&trig, &qdd), &expected, &bound);
+    }
 
     #[test]
     fn lagrange_and_newton_euler_agree(

@@ -6,6 +6,7 @@ use firmware::arm::IRB_930;
 use firmware::controller::{Config, MAX_GAP};
 use firmware::dynamics::drive::Drive;
 use firmware::node::{FRAMES_PER_POLL, Node, PEER_TIMEOUT_US};
+use firmware::phase::{Phase, Probe};
 use nalgebra::Vector4;
 use proptest::prelude::*;
 use protocol::bus::{Bus, TransmitError};
@@ -519,4 +520,100 @@ proptest! {
             prop_assert_eq!(clean.mode(), dirty.mode());
         }
     }
+}
+
+/// A probe that notes what it is told.
+#[derive(Default)]
+struct Marks(Vec<Phase>);
+
+impl Probe for Marks {
+    fn end(&mut self, phase: Phase) {
+        self.0.push(phase);
+    }
+}
+
+#[test]
+fn every_phase_of_a_sample_is_marked_once_and_in_order() {
+    let mut bench = Bench::enabled();
+    let frame = bench.next_feedback();
+    bench.wire.to_node.push_back(frame);
+    let mut marks = Marks::default();
+    bench.now += PERIOD_US;
+    bench.node.poll_with(bench.now, &mut bench.wire, &mut marks);
+    let mut expected = Phase::ALL.to_vec();
+    // After the sample the node has looked for more frames.
+    expected.insert(Phase::ALL.len() - 1, Phase::Decode);
+    assert_eq!(marks.0, expected);
+
+    let mut marks = Marks::default();
+    bench.node.poll_with(bench.now, &mut bench.wire, &mut marks);
+    assert_eq!(marks.0, [Phase::Decode, Phase::Report]);
+}
+
+/// A jump so slow that an arm that stands still does not stand out.
+fn jump() -> MotionRequest {
+    MotionRequest::Jump {
+        target: [0.6, 0.2, -0.25, 0.0],
+        top: -0.2,
+        clearance: 0.01,
+        speed: 1e-3,
+    }
+}
+
+/// No call both plans and reports; reports wait for ten samples at the most.
+#[test]
+fn planning_and_reports_take_turns() {
+    let mut bench = Bench::enabled();
+    let mut planned = 0;
+    for _ in 0..4 {
+        let frame = bench.motion(jump());
+        bench.wire.to_node.push_back(frame);
+    }
+    let mut silent = 0;
+    for _ in 0..300 {
+        let planning = bench.node.controller().is_planning();
+        let rests = bench.sample % 10 == 0;
+        let sent = bench.step();
+        let reports = sent
+            .iter()
+            .filter(|message| !matches!(message, Message::Command(_)))
+            .count();
+        if planning && !rests {
+            assert_eq!(reports, 0, "sample {}: {sent:?}", bench.sample);
+            planned += 1;
+        }
+        let state = sent
+            .iter()
+            .any(|message| matches!(message, Message::State(_)));
+        silent = if state { 0 } else { silent + 1 };
+        assert!(silent <= 30, "a state every 20 ms, or 10 later");
+    }
+    assert!(planned > 100);
+}
+
+/// A flood of requests is answered one by one; what finds no room is counted, not forgotten.
+#[test]
+fn answers_that_pile_up_are_sent_or_counted() {
+    let mut bench = Bench::enabled();
+    let flood = 40;
+    let mut answered = 0;
+    for _ in 0..flood / 4 {
+        for _ in 0..4 {
+            let frame = bench.motion(MotionRequest::Stop);
+            bench.wire.to_node.push_back(frame);
+        }
+        answered += replies(&bench.step());
+    }
+    answered += replies(&bench.run(20));
+    assert!(
+        answered < flood,
+        "the flood is to be more than the outbox holds"
+    );
+    assert_eq!(answered + usize::from(bench.node.unsent()), flood);
+}
+
+fn replies(sent: &[Message]) -> usize {
+    sent.iter()
+        .filter(|message| matches!(message, Message::MotionReply(_)))
+        .count()
 }

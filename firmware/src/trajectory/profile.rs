@@ -334,6 +334,36 @@ mod tests {
         }
     }
 
+    /// Between two borders the jerk is one constant; at each it changes. All eight are found, and no other.
+    #[test]
+    fn borders_are_where_the_jerk_changes() {
+        let bounds = Bounds {
+            speed: 2.0,
+            accelerate: 20.0,
+            brake: 30.0,
+            jerk: 1e3,
+        };
+        let curve = SCurve::new(1.0, &bounds);
+        let mut t = -0.1;
+        let borders = [(); 8].map(|()| {
+            let border = curve.border_after(t);
+            t = border + 1e-6;
+            border
+        });
+        assert_eq!(curve.border_after(t), f32::INFINITY);
+        assert_eq!(borders[0], 0.0);
+        assert!((borders[7] / curve.duration() - 1.0).abs() < 1e-6);
+        for (segment, jerk) in borders
+            .windows(2)
+            .zip([1e3, 0.0, -1e3, 0.0, -1e3, 0.0, 1e3])
+        {
+            for share in [0.01, 0.5, 0.99] {
+                let t = segment[0] + share * (segment[1] - segment[0]);
+                assert_eq!(curve.at(t).j, jerk, "{borders:?}");
+            }
+        }
+    }
+
     #[test]
     fn symmetric_triangle_has_the_textbook_duration() {
         // Without a speed limit and with jerk only: T = (32 s / j)^(1/3).
