@@ -14,6 +14,7 @@ use firmware::node::Node;
 use mps2_an386::{Channel, FROM_BOARD, REQUEST_LEN, Reply, Request, SETUP_LEN, Setup, TO_BOARD};
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
+use protocol::messages::ResetReason;
 
 use host::{End, File};
 
@@ -63,7 +64,7 @@ fn receive<'a>(input: &File, slot: &'a mut Option<Setup>) -> Result<&'a Setup, E
 
 #[inline(never)]
 fn build<'a>(config: &Config, slot: &'a mut Option<Node>) -> &'a mut Node {
-    slot.insert(Node::new(*config))
+    slot.insert(Node::new(*config, ResetReason::PowerOn))
 }
 
 /// Answers until the host goes away.

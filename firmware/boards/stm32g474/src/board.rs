@@ -36,7 +36,8 @@ fn main() -> ! {
     // First of all: whatever hangs from here on ends in a reset, and a reset lets go of every pin.
     let mut watchdog = IndependentWatchdog::new(board.IWDG, WATCHDOG_US);
     watchdog.unleash();
-    safe::log_reset_reason();
+    let reset = safe::reset_reason();
+    defmt::info!("started by {}", reset);
 
     let mut cabinet = Cabinet {
         brake: Output::new(board.PC0, Level::Low, Speed::Low),
@@ -47,7 +48,7 @@ fn main() -> ! {
         estop: Input::new(board.PC4, Pull::Down),
     };
     let can = Can::start(board.FDCAN1, board.PA11, board.PA12, TO_SEND, RECEIVED);
-    let node = NODE.insert(Node::new(Config::new(IRB_930, TICK)));
+    let node = NODE.insert(Node::new(Config::new(IRB_930, TICK), reset));
     let mut clock = Clock::start();
     let mut port = Port::new(can);
     let mut mode = Mode::Boot;
@@ -61,6 +62,7 @@ fn main() -> ! {
             let before = DWT::cycle_count();
             node.poll(clock.now(), &mut port);
             let cycles = DWT::cycle_count().wrapping_sub(before);
+            node.note_tick(cycles);
             if cycles > CYCLES_PER_TICK {
                 node.count_overrun();
             }
@@ -68,7 +70,7 @@ fn main() -> ! {
                 worst = cycles;
                 defmt::info!("worst call of the node so far: {} cycles", worst);
             }
-            if port.reset_asked() {
+            if node.reset_asked() {
                 safe::torque_off();
                 SCB::sys_reset();
             }

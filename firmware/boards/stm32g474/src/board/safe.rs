@@ -4,6 +4,7 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
+use protocol::messages::ResetReason;
 
 /// Brake and torque of the cabinet, on port C.
 const BRAKE: usize = 0;
@@ -43,15 +44,19 @@ unsafe fn DefaultHandler(_: i16) {
     stop()
 }
 
-/// Logs why the board has started, and forgets it, so that the next start tells its own reason.
-pub fn log_reset_reason() {
-    let reason = pac::RCC.csr().read();
+/// Why the board has started. Forgets it, so that the next start tells its own reason.
+pub fn reset_reason() -> ResetReason {
+    let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|csr| csr.set_rmvf(true));
-    defmt::info!(
-        "started by: watchdog {}, software {}, brown-out {}, pin {}",
-        reason.iwdgrstf(),
-        reason.sftrstf(),
-        reason.borrstf(),
-        reason.pinrstf()
-    );
+    // The pin's flag comes with every other: the chip pulls its own reset pin.
+    if flags.iwdgrstf() {
+        ResetReason::Watchdog
+    } else if flags.sftrstf() {
+        ResetReason::Software
+    } else if flags.borrstf() {
+        // One flag for a supply switched on and one that has sagged (RM0440, 7.4.28); the first is daily life.
+        ResetReason::PowerOn
+    } else {
+        ResetReason::Pin
+    }
 }
