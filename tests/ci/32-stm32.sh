@@ -1,10 +1,8 @@
 #!/usr/bin/env bash
 # The image for STM32G474 silicon: builds, fits, and the control code in it has no panic, no heap, no double precision.
-set -euo pipefail
-cd "$(dirname "$0")/../.."
+. "$(dirname "$0")/30-board.bash"
 
-image=$(tests/board/cargo build --release --quiet --locked --package stm32g474 --message-format=json |
-    grep -o '"executable":"[^"]*"' | cut -d'"' -f4)
+image=$(built stm32g474)
 arm-none-eabi-size "$image"
 tests/board/symbols "$image" --driver-panics
 echo "- the vector table leads to the handlers of the board"
