@@ -38,6 +38,7 @@ pub mod math;
 pub mod mode;
 pub mod monitor;
 pub mod node;
+pub mod reset;
 pub mod sample_clock;
 mod self_test;
 pub mod trajectory;
