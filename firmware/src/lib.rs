@@ -31,6 +31,8 @@ pub mod cabinet;
 pub mod controller;
 pub mod dynamics;
 pub mod jacobian;
+#[cfg(feature = "defmt")]
+pub mod journal;
 pub mod kinematics;
 pub mod laws;
 pub mod limits;

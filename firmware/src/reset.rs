@@ -9,8 +9,9 @@ use protocol::messages::ResetReason;
 pub struct Stop {
     /// What the next one gives as the reason of its start.
     pub reason: ResetReason,
-    /// Outputs as read back once torque had been taken away, in the bits of [`TORQUE_OFF`](crate::cabinet::TORQUE_OFF).
-    pub pins: u8,
+    /// Outputs as they were found, and as they were read back once torque had been taken away, in the bits of
+    /// [`TORQUE_OFF`](crate::cabinet::TORQUE_OFF).
+    pub pins: [u8; 2],
     /// Address of the instruction that failed; 0 if there was none, or it is not known.
     pub at: u32,
     /// Fault status of the core (CFSR of Armv7-M); 0 without a fault.
@@ -20,10 +21,10 @@ pub struct Stop {
 impl Stop {
     /// Nothing failed.
     #[must_use]
-    pub const fn without_fault(reason: ResetReason, pins: u8) -> Self {
+    pub const fn without_fault(reason: ResetReason) -> Self {
         Self {
             reason,
-            pins,
+            pins: [0; 2],
             at: 0,
             status: 0,
         }
@@ -36,7 +37,6 @@ const SEED: u32 = 0x5CA7_A571;
 /// A [`Stop`] in memory that a reset leaves alone. After power-on anything may be in it, and a reset may come in the
 /// middle of writing: what is not whole is nothing.
 #[derive(Debug)]
-#[repr(transparent)]
 pub struct Record([AtomicU32; 4]);
 
 impl Record {
@@ -53,7 +53,8 @@ impl Record {
 
     /// Keeps `stop` across the next reset.
     pub fn keep(&self, stop: &Stop) {
-        let cause = u32::from(stop.reason.code()) | u32::from(stop.pins) << 8;
+        let [found, left] = stop.pins;
+        let cause = u32::from_le_bytes([stop.reason.code(), found, left, 0]);
         let words = [
             cause,
             stop.at,
@@ -71,13 +72,13 @@ impl Record {
             self.0.each_ref().map(|place| place.load(Ordering::Relaxed));
         let [.., last] = &self.0;
         last.store(!word, Ordering::Relaxed);
-        let [reason, pins, 0, 0] = cause.to_le_bytes() else {
+        let [reason, found, left, 0] = cause.to_le_bytes() else {
             return None;
         };
         let reason = ResetReason::try_from(reason).ok()?;
         (word == check(cause, at, status)).then_some(Stop {
             reason,
-            pins,
+            pins: [found, left],
             at,
             status,
         })

@@ -6,18 +6,20 @@ use protocol::messages::ResetReason;
 
 const STOP: Stop = Stop {
     reason: ResetReason::HardFault,
-    pins: 0b1000,
+    pins: [0b0111, 0b1000],
     at: 0x0000_1234,
     status: 0x0000_0082,
 };
 
 fn any_stop() -> impl Strategy<Value = Stop> {
     let reason = proptest::sample::select(ResetReason::ALL);
-    (reason, any::<u8>(), any::<u32>(), any::<u32>()).prop_map(|(reason, pins, at, status)| Stop {
-        reason,
-        pins,
-        at,
-        status,
+    (reason, any::<[u8; 2]>(), any::<u32>(), any::<u32>()).prop_map(|(reason, pins, at, status)| {
+        Stop {
+            reason,
+            pins,
+            at,
+            status,
+        }
     })
 }
 

@@ -8,7 +8,7 @@ tests/board/symbols "$image" --driver-panics
 echo "- the vector table leads to the handlers of the board"
 # Not through a pipe: grep stops reading at the first match, and nm would die of that.
 names=$(arm-none-eabi-nm "$image")
-for handler in SysTick FDCAN1_IT0 HardFault; do
+for handler in SysTick FDCAN1_IT0 HardFault MemoryManagement; do
     grep -qi " t $handler$" <<<"$names"
 done
 cat <<'END'
