@@ -6,6 +6,11 @@
 use embedded_hal::digital::{InputPin, OutputPin};
 use protocol::messages::{ControlWord, Mode};
 
+/// Outputs of a controller that has failed: brake, torque, green, red, from bit 0 on.
+pub const TORQUE_OFF: u8 = 0b1000;
+/// Outputs of a controller that moves the arm.
+pub const RUNNING: u8 = 0b0111;
+
 /// Outputs and inputs of the cabinet.
 #[derive(Debug)]
 pub struct Cabinet<Brake, Torque, Green, Red, EStop> {

@@ -31,6 +31,8 @@ pub mod cabinet;
 pub mod controller;
 pub mod dynamics;
 pub mod jacobian;
+#[cfg(feature = "defmt")]
+pub mod journal;
 pub mod kinematics;
 pub mod laws;
 pub mod limits;
@@ -39,6 +41,7 @@ pub mod mode;
 pub mod monitor;
 pub mod node;
 pub mod phase;
+pub mod reset;
 pub mod sample_clock;
 mod self_test;
 pub mod trajectory;

@@ -11,8 +11,8 @@ use protocol::counters::Counters;
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::messages::{
     Cause, Command, Emergency, Feedback, Heartbeat, Hello, LimitFlags, Message, Motion,
-    MotionRequest, ParameterReply, ParameterRequest, Refusal, RefusalReason, ResetReason, Server,
-    State,
+    MotionRequest, NmtCommand, ParameterReply, ParameterRequest, Refusal, RefusalReason,
+    ResetReason, Server, State,
 };
 use protocol::messages::{Mode, Node as Name};
 use protocol::schema::SCHEMA_HASH;
@@ -64,15 +64,19 @@ pub struct Node {
     /// The drives were built from the same message table.
     same_schema: bool,
     overruns: u16,
+    worst_tick: u32,
+    /// Why the node was started, and whether network management has asked for another start.
+    reset: ResetReason,
+    reset_asked: bool,
     next_state: u64,
     next_heartbeat: u64,
 }
 
 impl Node {
-    /// A node in self-test.
+    /// A node in self-test, started for this reason.
     // Out of line it is built in place; inlined it would take its own size once more on the stack.
     #[inline(never)]
-    pub fn new(config: Config) -> Self {
+    pub fn new(config: Config, reset: ResetReason) -> Self {
         Self {
             controller: Controller::new(config),
             feedback: Receiver::new(Profile::Fd),
@@ -85,6 +89,9 @@ impl Node {
             newest: None,
             same_schema: false,
             overruns: 0,
+            worst_tick: 0,
+            reset,
+            reset_asked: false,
             next_state: 0,
             next_heartbeat: 0,
         }
@@ -110,6 +117,16 @@ impl Node {
         self.overruns = self.overruns.saturating_add(1);
     }
 
+    /// A shell that can measure a tick reports its cycles of the core; the most are kept.
+    pub fn note_tick(&mut self, cycles: u32) {
+        self.worst_tick = self.worst_tick.max(cycles);
+    }
+
+    /// Network management has asked for a reset: the shell is to start a new node. This one says no more.
+    pub fn reset_asked(&self) -> bool {
+        self.reset_asked
+    }
+
     /// Takes what has arrived, at most [`FRAMES_PER_POLL`] frames, and answers. `now` is a time
     /// in µs that never runs backwards; where it starts does not matter.
     pub fn poll<B: Bus>(&mut self, now: u64, bus: &mut B) {
@@ -132,6 +149,9 @@ impl Node {
                     planned |= self.take(&received.message, received.counter, now, bus, probe);
                 }
                 Err(error) => self.reject(error, &frame),
+            }
+            if self.reset_asked {
+                return;
             }
         }
         probe.end(Phase::Decode);
@@ -175,6 +195,10 @@ impl Node {
                 if self.admit(verdict) {
                     self.parameter(request, bus);
                 }
+            }
+            Message::Nmt(nmt) => {
+                let for_us = nmt.node == 0 || nmt.node == Name::Controller.code();
+                self.reset_asked |= for_us && nmt.command == NmtCommand::ResetNode;
             }
             // What other nodes tell each other, or the operator.
             _ => {}
@@ -339,7 +363,7 @@ impl Node {
             let heartbeat = Heartbeat {
                 state: self.controller.mode(),
                 cause: self.controller.cause(),
-                reset: ResetReason::PowerOn,
+                reset: self.reset,
             };
             let counter = self.sequence.heartbeat;
             self.sequence.heartbeat = counter.wrapping_add(1);
@@ -362,7 +386,7 @@ impl Node {
             completed: controller.completed(),
             overruns: self.overruns,
             rejected: self.received.dropped(),
-            worst_tick: 0,
+            worst_tick: self.worst_tick,
             law: selection.law,
             compensation: selection.compensation,
             tracking_error: (*controller.following_error()).into(),

@@ -14,7 +14,8 @@ use protocol::codec::{decode, encode};
 use protocol::frame::{CanFrame, StandardId};
 use protocol::messages::{
     Cause, Command, ControlWord, DriveStatus, EStop, EStopReason, Feedback, Hello, Message, Mode,
-    Motion, MotionRequest, Outcome, ParameterRequest, RefusalReason, Server, State,
+    Motion, MotionRequest, Nmt, NmtCommand, Node as Name, Outcome, ParameterRequest, RefusalReason,
+    ResetReason, Server, State,
 };
 use protocol::schema::SCHEMA_HASH;
 
@@ -54,7 +55,7 @@ impl Bench {
         let drive = Drive::new(&IRB_930.drive);
         let q = Vector4::new(0.2, 1.5, 0.15, 0.3);
         Self {
-            node: Node::new(Config::new(IRB_930, 1e-3)),
+            node: Node::new(Config::new(IRB_930, 1e-3), ResetReason::Watchdog),
             wire: Wire::default(),
             now: 0,
             sample: 0,
@@ -494,6 +495,50 @@ fn state_and_heartbeat_come_at_their_rates() {
     assert_eq!(beats, 10);
 }
 
+#[test]
+fn every_heartbeat_says_why_the_node_was_started() {
+    let reasons: Vec<_> = Bench::enabled()
+        .run(1000)
+        .iter()
+        .filter_map(|message| match message {
+            Message::Heartbeat(Name::Controller, heartbeat) => Some(heartbeat.reset),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(reasons, [ResetReason::Watchdog; 10]);
+}
+
+#[test]
+fn the_state_holds_the_longest_tick() {
+    let mut bench = Bench::new();
+    for cycles in [3000, 170_000, 5] {
+        bench.node.note_tick(cycles);
+    }
+    let worst = bench.run(20).iter().find_map(|message| match message {
+        Message::State(state) => Some(state.worst_tick),
+        _ => None,
+    });
+    assert_eq!(worst, Some(170_000));
+}
+
+#[test]
+fn a_node_asked_to_reset_says_so_and_nothing_more() {
+    for (node, command, asked) in [
+        (0, NmtCommand::ResetNode, true),
+        (Name::Controller.code(), NmtCommand::ResetNode, true),
+        (Name::Drives.code(), NmtCommand::ResetNode, false),
+        (0, NmtCommand::ResetCommunication, false),
+        (0, NmtCommand::Stop, false),
+    ] {
+        let mut bench = Bench::enabled();
+        let nmt = Message::Nmt(Nmt { command, node });
+        bench.wire.to_node.push_back(encode(&nmt, 0).unwrap());
+        let sent = bench.step();
+        assert_eq!(bench.node.reset_asked(), asked, "{command} {node}");
+        assert_eq!(sent.is_empty(), asked, "{command} {node}: {sent:?}");
+    }
+}
+
 fn junk() -> impl Strategy<Value = CanFrame> {
     let bytes = proptest::collection::vec(any::<u8>(), 0..64);
     (0u16..0x800, bytes, any::<bool>()).prop_filter_map("no frame", |(id, bytes, fd)| {
@@ -572,7 +617,7 @@ fn planning_and_reports_take_turns() {
     let mut silent = 0;
     for _ in 0..300 {
         let planning = bench.node.controller().is_planning();
-        let rests = bench.sample % 10 == 0;
+        let rests = bench.sample.is_multiple_of(10);
         let sent = bench.step();
         let reports = sent
             .iter()

@@ -6,6 +6,7 @@ use firmware::controller::Config;
 use firmware::node::Node;
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
+use protocol::messages::ResetReason;
 
 /// Time the controller takes from frame in to frame out, ns: 4000 instructions at 100 MHz.
 pub const COMPUTE_NS: u64 = 40_000;
@@ -66,6 +67,7 @@ pub struct EndpointError {
 /// The controller as a part of this process.
 #[derive(Debug)]
 pub struct InProcess {
+    config: Config,
     node: Node,
 }
 
@@ -73,8 +75,14 @@ impl InProcess {
     /// A controller in self-test.
     pub fn new(config: Config) -> Self {
         Self {
-            node: Node::new(config),
+            config,
+            node: Node::new(config, ResetReason::PowerOn),
         }
+    }
+
+    /// Starts the controller again, for this reason.
+    pub fn restart(&mut self, reason: ResetReason) {
+        self.node = Node::new(self.config, reason);
     }
 }
 
@@ -85,6 +93,10 @@ impl Endpoint for InProcess {
         received: Option<&CanFrame>,
         sent: &mut Vec<CanFrame>,
     ) -> Result<(), EndpointError> {
+        // Network management's reset, asked for in the last call.
+        if self.node.reset_asked() {
+            self.restart(ResetReason::Software);
+        }
         let mut port = Port {
             received: received.copied().into_iter().collect(),
             sent,

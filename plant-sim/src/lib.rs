@@ -9,6 +9,7 @@ pub mod drives;
 pub mod endpoint;
 pub mod eval;
 pub mod external;
+pub mod faults;
 pub mod metrics;
 pub mod model;
 pub mod monitor;

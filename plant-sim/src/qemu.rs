@@ -11,9 +11,10 @@ use std::rc::Rc;
 
 use firmware::controller::Config;
 use firmware::node::Node;
+use firmware::reset::Stop;
 use firmware::sample_clock::SampleClock;
 pub use mps2_an386::Channel;
-use mps2_an386::{Request, Setup};
+use mps2_an386::{Fault, Request, Setup};
 use protocol::frame::CanFrame;
 
 use crate::endpoint::{Endpoint, EndpointError, InProcess};
@@ -22,7 +23,7 @@ use board::Board;
 /// What the emulation is asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The image; `None` builds it from the sources.
+    /// The image; `None` builds [`IMAGE`] from the sources.
     pub image: Option<PathBuf>,
     /// How frames travel between the rig and the board.
     pub channel: Channel,
@@ -51,6 +52,19 @@ pub struct Poll {
     pub planning: bool,
 }
 
+/// The image that goes into runs, and the one that can plant faults into itself.
+pub const IMAGE: &str = "mps2-an386";
+/// See [`IMAGE`].
+pub const FAULTS_IMAGE: &str = "mps2-an386-faults";
+
+/// Builds an image from the sources; returns where it is.
+///
+/// # Errors
+/// It cannot be built; with what to do about it.
+pub fn build(program: &str) -> Result<PathBuf, EndpointError> {
+    image::build(program)
+}
+
 /// The controller in QEMU with its twin in this process.
 #[derive(Debug)]
 pub struct Qemu {
@@ -59,6 +73,9 @@ pub struct Qemu {
     board: Board,
     /// Time on the UART: that of the drives' samples, since slcan carries no other.
     clock: Option<SampleClock>,
+    period_ns: u64,
+    /// How the board ended when it last started again.
+    last_stop: Option<Stop>,
     count: Option<Rc<RefCell<Measured>>>,
 }
 
@@ -70,7 +87,7 @@ impl Qemu {
     pub fn start(config: Config, options: &Options) -> Result<Self, EndpointError> {
         let image = match &options.image {
             Some(image) => image.clone(),
-            None => image::build()?,
+            None => build(IMAGE)?,
         };
         let setup = Setup {
             channel: options.channel,
@@ -80,9 +97,56 @@ impl Qemu {
             twin: InProcess::new(config),
             expected: Vec::new(),
             board: Board::start(&image, &setup, options.count.is_some())?,
+            period_ns: setup.period_ns(),
+            last_stop: None,
             clock: (setup.channel == Channel::Uart).then(|| SampleClock::new(setup.period_ns())),
             count: options.count.clone(),
         })
+    }
+
+    /// Has the image plant this fault into itself; only [`FAULTS_IMAGE`] does. Follows the board through its start, and
+    /// starts the twin for the same reason.
+    ///
+    /// # Errors
+    /// The board does not start again.
+    pub fn plant(&mut self, fault: Fault) -> Result<(), EndpointError> {
+        self.board.tell(&Request::Plant(fault))?;
+        let stop = self.board.restart()?;
+        self.last_stop = Some(stop);
+        self.twin.restart(stop.reason);
+        Ok(())
+    }
+
+    /// How the board ended when it last started again in this run.
+    pub fn last_stop(&self) -> Option<Stop> {
+        self.last_stop
+    }
+
+    /// Hands over the frame that resets the board, and follows it through its start.
+    fn reset(&mut self, now: u64, frame: Option<CanFrame>) -> Result<(), EndpointError> {
+        match (&mut self.clock, frame) {
+            (Some(clock), Some(frame)) => {
+                self.board.send(&frame)?;
+                *clock = SampleClock::new(self.period_ns);
+            }
+            _ => self.board.tell(&Request::Poll { now, frame })?,
+        }
+        self.last_stop = Some(self.board.restart()?);
+        Ok(())
+    }
+
+    /// What the board can tell only at the very end: bytes lost, and the stack when the deepest path has been taken.
+    fn say_goodbye(&mut self) {
+        if self.clock.take().is_some()
+            && let Ok(lost @ 1..) = self.board.close_bus()
+        {
+            eprintln!("plant-sim: the controller in QEMU has lost {lost} bytes on its UART");
+        }
+        if let Some(count) = self.count.take()
+            && let Ok(stack) = self.board.ask(&Request::Stack, &mut Vec::new())
+        {
+            count.borrow_mut().stack = stack;
+        }
     }
 }
 
@@ -95,23 +159,29 @@ impl Endpoint for Qemu {
     ) -> Result<(), EndpointError> {
         let first = sent.len();
         let mut now = now;
-        let ticks = match (&mut self.clock, received) {
-            (None, _) => {
-                let frame = received.copied();
-                self.board.ask(&Request::Poll { now, frame }, sent)?
-            }
+        let frame = received.copied();
+        match (&mut self.clock, received) {
+            (None, _) => {}
             (Some(clock), Some(frame)) => {
                 clock.observe(frame);
                 now = clock.now();
-                self.board.exchange(frame, sent)?;
-                0
             }
             // Without a frame there is nothing that the UART could tell the board.
             (Some(_), None) => return Ok(()),
-        };
+        }
         let planning = self.twin.node().controller().is_planning();
         self.expected.clear();
         self.twin.poll(now, received, &mut self.expected)?;
+        if self.twin.node().reset_asked() {
+            return self.reset(now, frame);
+        }
+        let ticks = match received {
+            Some(frame) if self.clock.is_some() => {
+                self.board.exchange(frame, sent)?;
+                0
+            }
+            _ => self.board.ask(&Request::Poll { now, frame }, sent)?,
+        };
         if let Some(what) = difference::first(&self.expected, &sent[first..], now) {
             return Err(failure(what));
         }
@@ -131,18 +201,8 @@ impl Endpoint for Qemu {
 }
 
 impl Drop for Qemu {
-    /// What the board can tell only at the very end: bytes lost, and the stack when the deepest path has been taken.
     fn drop(&mut self) {
-        if self.clock.is_some()
-            && let Ok(lost @ 1..) = self.board.close_bus()
-        {
-            eprintln!("plant-sim: the controller in QEMU has lost {lost} bytes on its UART");
-        }
-        if let Some(count) = &self.count
-            && let Ok(stack) = self.board.ask(&Request::Stack, &mut Vec::new())
-        {
-            count.borrow_mut().stack = stack;
-        }
+        self.say_goodbye();
     }
 }
 

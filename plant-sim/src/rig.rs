@@ -161,6 +161,11 @@ impl<E: Endpoint> Rig<E> {
         self.controller.node()
     }
 
+    /// The controller's end of the rig.
+    pub fn controller(&mut self) -> &mut E {
+        &mut self.controller
+    }
+
     /// Frames that found a full transmit queue.
     pub fn dropped(&self) -> u64 {
         self.dropped

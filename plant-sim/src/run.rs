@@ -292,27 +292,7 @@ pub fn execute_with<E: Endpoint>(
     connect: impl FnOnce(Config) -> Result<E, EndpointError>,
 ) -> Result<Summary, ExecuteError> {
     let scenario = &config.scenario;
-    let believed = ArmModel::from(&config.model);
-    believed.validate().map_err(|source| ExecuteError::Model {
-        robot: config.model.name.clone(),
-        source,
-    })?;
-    let mut plant = config.plant_model.clone();
-    for axis in 0..4 {
-        plant.drive.viscous[axis] *= scenario.mismatch.friction;
-        plant.drive.coulomb[axis] *= scenario.mismatch.friction;
-    }
-    let rig = RigConfig {
-        start: start(scenario, &plant)?,
-        plant,
-        believed,
-        rate_hz: scenario.rate_hz,
-        timing: BitTiming::default(),
-    };
-    rig::admit(&rig.timing, rig.rate_hz).map_err(|source| ExecuteError::Link {
-        rate_hz: rig.rate_hz,
-        source,
-    })?;
+    let rig = rig_config(config)?;
     let output = |path: &Path| {
         let path = path.to_path_buf();
         move |source| ExecuteError::Output { path, source }
@@ -380,6 +360,36 @@ pub fn execute_with<E: Endpoint>(
             .map_err(output(directory))?;
     }
     Ok(summary)
+}
+
+/// The rig that a run needs.
+///
+/// # Errors
+/// The robot cannot start there, the controller not work with it, or the bus not carry the messages.
+pub fn rig_config(config: &RunConfig) -> Result<RigConfig, ExecuteError> {
+    let scenario = &config.scenario;
+    let believed = ArmModel::from(&config.model);
+    believed.validate().map_err(|source| ExecuteError::Model {
+        robot: config.model.name.clone(),
+        source,
+    })?;
+    let mut plant = config.plant_model.clone();
+    for axis in 0..4 {
+        plant.drive.viscous[axis] *= scenario.mismatch.friction;
+        plant.drive.coulomb[axis] *= scenario.mismatch.friction;
+    }
+    let rig = RigConfig {
+        start: start(scenario, &plant)?,
+        plant,
+        believed,
+        rate_hz: scenario.rate_hz,
+        timing: BitTiming::default(),
+    };
+    rig::admit(&rig.timing, rig.rate_hz).map_err(|source| ExecuteError::Link {
+        rate_hz: rig.rate_hz,
+        source,
+    })?;
+    Ok(rig)
 }
 
 fn partial(directory: &Path, name: &str) -> PathBuf {

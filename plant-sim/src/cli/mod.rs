@@ -3,6 +3,7 @@
 mod cost;
 mod dbc;
 mod eval;
+mod faults;
 mod model;
 mod monitor;
 mod run;
@@ -31,6 +32,8 @@ enum Command {
     Run(run::RunArgs),
     /// Count the instructions and the stack that the controller takes on the emulated Cortex-M4F.
     Cost(cost::CostArgs),
+    /// Plant faults into the controller on the emulated Cortex-M4F, and see where they end.
+    Faults(faults::FaultsArgs),
     /// Compute kinematics or dynamics for the rows of a CSV table on standard input.
     Eval(eval::EvalArgs),
     /// Measure how regular the loop with an external controller is, beside what watches over it.
@@ -53,6 +56,7 @@ pub fn main() -> Result<ExitCode, String> {
         None => run::run(&cli.run),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Cost(args)) => cost::run(&args),
+        Some(Command::Faults(args)) => faults::run(&args),
         Some(Command::Eval(args)) => eval::run(&args),
         Some(Command::Timing(args)) => timing::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),

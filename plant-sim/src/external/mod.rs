@@ -28,7 +28,7 @@ use protocol::bus::{Bus, TransmitError};
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::link::{Link, LinkAddress};
-use protocol::messages::{Message, Mode, Node as Name};
+use protocol::messages::{Message, Mode, Node as Name, ResetReason};
 use protocol::table;
 
 use crate::endpoint::{Endpoint, EndpointError};
@@ -218,10 +218,13 @@ impl Endpoint for LockStep {
     }
 }
 
-/// The same controller in this process. The time that a command takes is what a controller on a real bus assumes, not
+/// The same controller in this process, started by network management. The time that a command takes is what a controller on a real bus assumes, not
 /// what the rig knows.
 pub(crate) fn twin(config: &Config) -> Node {
-    Node::new(Config::new(config.arm, config.period))
+    Node::new(
+        Config::new(config.arm, config.period),
+        ResetReason::Software,
+    )
 }
 
 /// Whether a frame says that its sender has just started.

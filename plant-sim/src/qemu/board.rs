@@ -4,22 +4,22 @@
 //! reads the end of it, or, on its UART, when nothing has come for 20 s. A thread watches over a child that does not get
 //! that far.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, BufReader, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use firmware::reset::Stop;
 use mps2_an386::{
-    Channel, FRAME_LEN, FROM_BOARD, REPLY_HEADER, Request, Setup, TO_BOARD, frame_from_bytes,
-    reply_header,
+    Channel, FRAME_LEN, GREETING_LEN, REPLY_HEADER, Request, SETUP_LEN, Setup, frame_from_bytes,
+    greeted, is_greeting, reply_header,
 };
 use protocol::frame::CanFrame;
-use rustix::fs::{CWD, FileType, Mode, OFlags, mknodat};
 
 use super::failure;
 use super::serial::Serial;
@@ -44,15 +44,18 @@ pub fn instructions(ticks: u32) -> u32 {
     (u64::from(ticks) * TICK_NS).div_ceil(1 << ICOUNT_SHIFT) as u32
 }
 
-/// Name of the socket that is the other end of UART 0.
+/// Names of the socket that is the other end of UART 0, and of the file that UART 1 goes to.
 const UART: &str = "uart";
+const LOG: &str = "log";
 
 /// A running board.
 #[derive(Debug)]
 pub struct Board {
+    /// What it is told at every start.
+    setup: [u8; SETUP_LEN],
     /// `None` once the channel is closed.
-    requests: Option<File>,
-    replies: BufReader<File>,
+    requests: Option<ChildStdin>,
+    replies: BufReader<ChildStdout>,
     /// What the frames travel on, unless it is the FIFOs.
     serial: Option<Serial<UnixStream>>,
     watch: Arc<Watch>,
@@ -85,11 +88,6 @@ impl Board {
             .to_bytes()
             .ok_or_else(|| failure("cannot be configured: the record is too short"))?;
         let place = Place::new()?;
-        let requests = place.fifo(TO_BOARD, OFlags::RDWR)?;
-        // Keeps the FIFO open for writing until the board has done so, or the child has ended: only then is there an
-        // end to be read.
-        let door = place.fifo(FROM_BOARD, OFlags::RDWR)?;
-        let replies = place.open(FROM_BOARD, OFlags::RDONLY)?;
 
         let mut command = Command::new(EMULATOR);
         command
@@ -99,15 +97,15 @@ impl Board {
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-kernel")
             .arg(&image)
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
             .stderr(Stdio::piped());
         if count {
             command.args(["-icount", &format!("shift={ICOUNT_SHIFT}")]);
         }
         let socket = match setup.channel {
             Channel::Fifo => {
-                command.args(["-serial", "none"]);
+                command.args(["-serial", "null"]);
                 None
             }
             Channel::Uart => {
@@ -121,27 +119,33 @@ impl Board {
                 Some(socket)
             }
         };
-        let child = command.spawn().map_err(|error| {
+        command.args(["-serial", &format!("file:{LOG}")]);
+        let mut child = command.spawn().map_err(|error| {
             failure(if error.kind() == io::ErrorKind::NotFound {
                 format!("needs {EMULATOR}; install it: apt-get install qemu-system-arm")
             } else {
                 format!("cannot be started: {EMULATOR}: {error}")
             })
         })?;
+        let requests = child.stdin.take();
+        let replies = child
+            .stdout
+            .take()
+            .ok_or_else(|| failure("has no output"))?;
         let watch = Arc::new(Watch::default());
         let watched = Arc::clone(&watch);
-        let watcher = thread::spawn(move || supervise(child, &watched, door));
+        let watcher = thread::spawn(move || supervise(child, &watched));
         let mut board = Self {
-            requests: Some(requests),
+            setup: record,
+            requests,
             replies: BufReader::new(replies),
             serial: None,
             watch,
             watcher: Some(watcher),
         };
-        board.say(&record)?;
-        // The first answer tells that both ends are open, and the socket since before the board started: their names may
-        // go.
-        board.wait(|board| listen(&mut board.replies, &mut Vec::new()))?;
+        // The emulator has opened all of its ends before the board says a word: the names may go when this function
+        // ends.
+        board.set_up()?;
         if let Some(socket) = socket {
             let (line, _) = socket
                 .accept()
@@ -150,6 +154,27 @@ impl Board {
             board.serial(Serial::open)?;
         }
         Ok(board)
+    }
+
+    /// Follows a board that starts again, up to where it is ready; returns how it ended before.
+    pub fn restart(&mut self) -> Result<Stop, EndpointError> {
+        let stop = self.set_up()?;
+        if self.serial.is_some() {
+            self.serial(Serial::open)?;
+        }
+        Ok(stop)
+    }
+
+    /// Takes the greeting, tells the board its setup, and waits until it is ready.
+    fn set_up(&mut self) -> Result<Stop, EndpointError> {
+        let said = self.wait(|board| listen(&mut board.replies, &mut Vec::new()))?;
+        let Said::Greeting(stop) = said else {
+            return Err(failure("goes on where it was to start again"));
+        };
+        let record = self.setup;
+        self.say(&record)?;
+        self.answer(&mut Vec::new())?;
+        Ok(stop)
     }
 
     /// Hands a frame over on the UART, and appends what comes back to `sent`.
@@ -161,10 +186,15 @@ impl Board {
         self.serial(|serial| serial.exchange(frame, sent))
     }
 
+    /// Hands over a frame on the UART that resets the board: there is no answer.
+    pub fn send(&mut self, frame: &CanFrame) -> Result<(), EndpointError> {
+        self.serial(|serial| serial.send(frame))
+    }
+
     /// Closes the bus on the UART; returns how many bytes the board's receiver has lost.
     pub fn close_bus(&mut self) -> Result<u32, EndpointError> {
         self.serial(Serial::close)?;
-        self.wait(|board| listen(&mut board.replies, &mut Vec::new()))
+        self.answer(&mut Vec::new())
     }
 
     fn serial<T>(
@@ -183,8 +213,24 @@ impl Board {
         request: &Request,
         sent: &mut Vec<CanFrame>,
     ) -> Result<u32, EndpointError> {
-        self.say(&request.to_bytes())?;
-        self.wait(|board| listen(&mut board.replies, sent))
+        self.tell(request)?;
+        self.answer(sent)
+    }
+
+    /// Asks for what has no answer: the board is to start again.
+    pub fn tell(&mut self, request: &Request) -> Result<(), EndpointError> {
+        self.say(&request.to_bytes())
+    }
+
+    fn answer(&mut self, sent: &mut Vec<CanFrame>) -> Result<u32, EndpointError> {
+        match self.wait(|board| listen(&mut board.replies, sent))? {
+            Said::Reply(measured) => Ok(measured),
+            Said::Greeting(stop) => Err(failure(format!(
+                "has started again by itself: {} at {:#010x}, fault status {:#010x}; arm-none-eabi-addr2line -fe IMAGE \
+                 ADDRESS names the place",
+                stop.reason, stop.at, stop.status
+            ))),
+        }
     }
 
     /// Waits for the board, under the eyes of the watching thread.
@@ -241,10 +287,25 @@ impl Drop for Board {
     }
 }
 
-/// Reads one answer.
-fn listen(replies: &mut impl Read, sent: &mut Vec<CanFrame>) -> io::Result<u32> {
+/// What the board says on its FIFO.
+enum Said {
+    /// An answer, with its number.
+    Reply(u32),
+    /// That it has started, and how it ended before.
+    Greeting(Stop),
+}
+
+/// Reads what the board says next.
+fn listen(replies: &mut impl Read, sent: &mut Vec<CanFrame>) -> io::Result<Said> {
     let mut header = [0; REPLY_HEADER];
     replies.read_exact(&mut header)?;
+    if is_greeting(header) {
+        let mut rest = [0; GREETING_LEN - REPLY_HEADER];
+        replies.read_exact(&mut rest)?;
+        return greeted(&rest)
+            .map(Said::Greeting)
+            .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, "no reason of its start"));
+    }
     let (count, measured) = reply_header(header);
     for _ in 0..count {
         let mut record = [0; FRAME_LEN];
@@ -253,14 +314,14 @@ fn listen(replies: &mut impl Read, sent: &mut Vec<CanFrame>) -> io::Result<u32> 
             .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, "no frame"))?;
         sent.push(frame);
     }
-    Ok(measured)
+    Ok(Said::Reply(measured))
 }
 
-/// Waits for the child to end, and sees to it that it does. `door` closes with it.
-fn supervise(mut child: Child, watch: &Watch, door: File) -> Ended {
+/// Waits for the child to end, and sees to it that it does.
+fn supervise(mut child: Child, watch: &Watch) -> Ended {
     let mut seen = (0, 0);
     let mut farewell = 0;
-    let ended = loop {
+    loop {
         match child.try_wait() {
             Ok(None) => {}
             Ok(Some(status)) => break Ended::ByItself(Ok(status), said(&mut child)),
@@ -281,9 +342,7 @@ fn supervise(mut child: Child, watch: &Watch, door: File) -> Ended {
             break Ended::Hung;
         }
         thread::sleep(LOOK);
-    };
-    drop(door);
-    ended
+    }
 }
 
 /// What a child that has ended has written to standard error.
@@ -295,7 +354,7 @@ fn said(child: &mut Child) -> String {
     text
 }
 
-/// A directory for the two FIFOs, which goes when the board has opened them.
+/// A directory for the names that the emulator opens.
 struct Place(PathBuf);
 
 impl Place {
@@ -307,25 +366,6 @@ impl Place {
         fs::create_dir(&path).map_err(|error| unusable(&path, &error))?;
         Ok(Self(path))
     }
-
-    /// Makes a FIFO and opens it.
-    fn fifo(&self, name: &std::ffi::CStr, flags: OFlags) -> Result<File, EndpointError> {
-        let path = self.path(name);
-        mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)
-            .map_err(|error| unusable(&path, &error.into()))?;
-        self.open(name, flags)
-    }
-
-    fn open(&self, name: &std::ffi::CStr, flags: OFlags) -> Result<File, EndpointError> {
-        let path = self.path(name);
-        rustix::fs::open(&path, flags | OFlags::CLOEXEC, Mode::empty())
-            .map(File::from)
-            .map_err(|error| unusable(&path, &error.into()))
-    }
-
-    fn path(&self, name: &std::ffi::CStr) -> PathBuf {
-        self.0.join(name.to_string_lossy().as_ref())
-    }
 }
 
 impl Drop for Place {
@@ -336,4 +376,23 @@ impl Drop for Place {
 
 fn unusable(path: &Path, error: &io::Error) -> EndpointError {
     failure(format!("cannot be reached: {}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use mps2_an386::{Reply, greeting};
+    use protocol::messages::ResetReason;
+
+    use super::*;
+
+    /// A board that has started again is noticed where an answer was due.
+    #[test]
+    fn a_greeting_is_no_answer() {
+        let stop = Stop::without_fault(ResetReason::Watchdog);
+        let mut said = &[Reply::new().finish(7), &greeting(&stop)].concat()[..];
+        let mut listen = || listen(&mut said, &mut Vec::new());
+        assert!(matches!(listen(), Ok(Said::Reply(7))));
+        assert!(matches!(listen(), Ok(Said::Greeting(last)) if last == stop));
+        assert!(listen().is_err());
+    }
 }

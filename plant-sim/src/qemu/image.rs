@@ -6,11 +6,10 @@ use std::process::{Command, Stdio};
 use super::failure;
 use crate::endpoint::EndpointError;
 
-/// Package and program.
 const PACKAGE: &str = "mps2-an386";
 
-/// Builds the image; returns where it is.
-pub fn build() -> Result<PathBuf, EndpointError> {
+/// Builds an image of the board; returns where it is.
+pub fn build(program: &str) -> Result<PathBuf, EndpointError> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/board/cargo");
     if !script.exists() {
         return Err(failure(format!(
@@ -20,6 +19,7 @@ pub fn build() -> Result<PathBuf, EndpointError> {
     }
     let output = Command::new(&script)
         .args(["build", "--release", "--quiet", "--package", PACKAGE])
+        .args(["--bin", program])
         .arg("--message-format=json-render-diagnostics")
         .stderr(Stdio::inherit())
         .output()
@@ -31,7 +31,7 @@ pub fn build() -> Result<PathBuf, EndpointError> {
         )));
     }
     executable(&output.stdout)
-        .ok_or_else(|| failure(format!("cannot be built: cargo names no program {PACKAGE}")))
+        .ok_or_else(|| failure(format!("cannot be built: cargo names no program {program}")))
 }
 
 /// The program among cargo's messages, one JSON object a line.

@@ -43,8 +43,13 @@ impl<S: Read + Write> Serial<S> {
 
     /// Hands a frame over and appends what the board sends before it acknowledges.
     pub fn exchange(&mut self, frame: &CanFrame, sent: &mut Vec<CanFrame>) -> io::Result<()> {
-        self.say(Line::Frame(*frame))?;
+        self.send(frame)?;
         self.answer(sent)
+    }
+
+    /// Hands a frame over that has no answer.
+    pub fn send(&mut self, frame: &CanFrame) -> io::Result<()> {
+        self.say(Line::Frame(*frame))
     }
 
     /// Closes the bus. There is no answer.

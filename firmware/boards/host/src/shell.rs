@@ -6,10 +6,9 @@ use std::time::{Duration, Instant, SystemTime};
 use firmware::controller::Config;
 use firmware::node::Node;
 use protocol::bus::{Bus, TransmitError};
-use protocol::codec;
 use protocol::frame::{CanFrame, Id};
 use protocol::link::{Link, LinkError, Stamped};
-use protocol::messages::{Message, Mode, NmtCommand, Node as Name};
+use protocol::messages::{Mode, Node as Name, ResetReason};
 use protocol::schema::MessageInfo;
 
 use crate::clock::{Clock, is_feedback};
@@ -68,7 +67,7 @@ impl Shell {
         let deadline =
             matches!(clock, Clock::RealTime { .. }).then(|| Duration::from_secs_f32(config.period));
         Self {
-            node: Node::new(config),
+            node: Node::new(config, ResetReason::PowerOn),
             link,
             bus,
             config,
@@ -126,15 +125,14 @@ impl Shell {
     fn take(&mut self, stamped: &Stamped) -> Result<(), ShellError> {
         let frame = &stamped.frame;
         self.refuse_duplicate(frame)?;
-        if is_reset(frame) {
-            eprintln!("controller: reset by network management");
-            self.node = Node::new(self.config);
-            self.clock.restart();
-            self.poll(None);
-            return Ok(());
-        }
         self.clock.observe(frame);
         self.poll(Some(*frame));
+        if self.node.reset_asked() {
+            eprintln!("controller: reset by network management");
+            self.node = Node::new(self.config, ResetReason::Software);
+            self.clock.restart();
+            self.poll(None);
+        }
         if is_feedback(frame) {
             self.answered(stamped.at);
         }
@@ -200,17 +198,6 @@ impl Shell {
             _ => Ok(()),
         }
     }
-}
-
-fn is_reset(frame: &CanFrame) -> bool {
-    let Ok(codec::Received {
-        message: Message::Nmt(nmt),
-        ..
-    }) = codec::decode(frame)
-    else {
-        return false;
-    };
-    nmt.command == NmtCommand::ResetNode && (nmt.node == 0 || nmt.node == Name::Controller.code())
 }
 
 /// The bus as the node sees it in one call: at most the frame that is due.

@@ -2,20 +2,30 @@
 
 mod adapter;
 mod host;
-mod panic;
+mod log;
+mod pins;
 mod stack;
 mod uart;
 
+use core::sync::atomic::Ordering;
+
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m_rt::{ExceptionFrame, entry, exception};
+use cortex_m_rt::{entry, exception};
 use firmware::controller::Config;
+use firmware::journal::Journal;
 use firmware::node::Node;
-use mps2_an386::{Channel, FROM_BOARD, REQUEST_LEN, Reply, Request, SETUP_LEN, Setup, TO_BOARD};
+use firmware::reset::Stop;
+use mps2_an386::{
+    Channel, FROM_BOARD, REQUEST_LEN, Reply, Request, SETUP_LEN, Setup, TO_BOARD, greeting,
+};
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
+use protocol::messages::ResetReason;
 
-use host::{End, File};
+pub use host::End;
+use host::File;
+use pins::Pins;
 
 /// Greatest count of SysTick, which counts down.
 const SYST_MAX: u32 = 0x00FF_FFFF;
@@ -26,6 +36,8 @@ fn main() -> ! {
     static mut SETUP: Option<Setup> = None;
     static mut NODE: Option<Node> = None;
     static mut REPLY: Reply = Reply::new();
+    cortex_m4::guard();
+    uart::LOG.start();
     host::exit(start(SETUP, NODE, REPLY))
 }
 
@@ -34,18 +46,23 @@ fn start(setup: &mut Option<Setup>, node: &mut Option<Node>, reply: &mut Reply) 
     start_timer(&mut core.SYST);
     let input = File::open(TO_BOARD)?;
     let output = File::create(FROM_BOARD)?;
+    let mut pins = pins::cabinet();
+    // No flag of this board says why it was reset; what has ended here has left a record.
+    let last = cortex_m4::last_stop().unwrap_or(Stop::without_fault(ResetReason::PowerOn));
+    output.write(&greeting(&last))?;
+    let mut journal = Journal::begin(&last);
     let setup = receive(&input, setup)?;
-    let node = build(&setup.config, node);
+    let node = build(&setup.config, last.reason, node);
     if setup.channel == Channel::Uart {
         core.SYST.enable_interrupt();
-        uart::start();
+        uart::FRAMES.start_receiving();
     }
-    // Tells the host that both ends are open.
+    // Tells the host that the node is there.
     output.write(reply.finish(0))?;
     match setup.channel {
-        Channel::Fifo => serve(&input, &output, node, reply),
+        Channel::Fifo => serve(&input, &output, node, &mut pins, &mut journal, reply),
         Channel::Uart => {
-            adapter::serve(node, setup.period_ns());
+            adapter::serve(node, &mut pins, &mut journal, setup.period_ns());
             reply.clear();
             output.write(reply.finish(uart::RECEIVED.lost() as u32))
         }
@@ -62,19 +79,34 @@ fn receive<'a>(input: &File, slot: &'a mut Option<Setup>) -> Result<&'a Setup, E
 }
 
 #[inline(never)]
-fn build<'a>(config: &Config, slot: &'a mut Option<Node>) -> &'a mut Node {
-    slot.insert(Node::new(*config))
+fn build<'a>(config: &Config, reset: ResetReason, slot: &'a mut Option<Node>) -> &'a mut Node {
+    slot.insert(Node::new(*config, reset))
 }
 
 /// Answers until the host goes away.
 #[inline(never)]
-fn serve(input: &File, output: &File, node: &mut Node, reply: &mut Reply) -> Result<(), End> {
+fn serve(
+    input: &File,
+    output: &File,
+    node: &mut Node,
+    pins: &mut Pins,
+    journal: &mut Journal,
+    reply: &mut Reply,
+) -> Result<(), End> {
     let mut record = [0; REQUEST_LEN];
     while input.read(&mut record).is_ok() {
         reply.clear();
         let measured = match Request::from_bytes(&record).ok_or(End)? {
-            Request::Poll { now, frame } => poll(node, now, frame, reply),
+            Request::Poll { now, frame } => {
+                let ticks = poll(node, now, frame, reply);
+                settle(node, now, pins, journal);
+                ticks
+            }
             Request::Stack => stack::used() as u32,
+            Request::Plant(fault) => {
+                crate::plant(fault)?;
+                0
+            }
         };
         output.write(reply.finish(measured))?;
     }
@@ -87,6 +119,18 @@ fn poll(node: &mut Node, now: u64, received: Option<CanFrame>, reply: &mut Reply
     let before = SYST::get_current();
     node.poll(now, &mut port);
     before.wrapping_sub(SYST::get_current()) & SYST_MAX
+}
+
+/// What comes after every call of the node: a reset if it was asked for, the pins, the log.
+fn settle(node: &Node, now: u64, pins: &mut Pins, journal: &mut Journal) {
+    if node.reset_asked() {
+        cortex_m4::restart(ResetReason::Software);
+    }
+    let controller = node.controller();
+    // These pins cannot fail.
+    let _ = pins.show(controller.mode(), controller.control_word());
+    log::NOW.store((now / 1000) as u32, Ordering::Relaxed);
+    journal.note(controller);
 }
 
 /// SysTick from the core clock, over its whole range.
@@ -125,12 +169,6 @@ unsafe fn DefaultHandler(irq: i16) {
     if irq == uart::RECEIVE_IRQ {
         uart::receive();
     } else {
-        host::exit(Err(End));
+        cortex_m4::restart(ResetReason::HardFault);
     }
-}
-
-/// A hard fault ends the emulation with an error, which the host reports.
-#[exception]
-unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-    host::exit(Err(End))
 }

@@ -1,7 +1,8 @@
 //! What the emulated board and the host that emulates it tell each other, compiled by both of its ends.
 //!
-//! Two FIFOs, which the board opens through Arm semihosting in the emulator's working directory. The host says once what
-//! the controller is to know and how frames travel ([`Setup`]); the board answers once it is ready ([`Reply`]). Then
+//! Two FIFOs, standard input and output of the emulator, which the board opens through Arm semihosting. At every start the
+//! board says how it ended before ([`greeting`]), the host what the controller is to know and how frames travel
+//! ([`Setup`]), and the board answers once it is ready ([`Reply`]). Then
 //!
 //! - [`Channel::Fifo`]: the host asks ([`Request`]) and waits for the answer ([`Reply`]) for ever after, and ends the
 //!   conversation by closing its end. This is the path for long comparisons: a round trip takes microseconds.
@@ -29,14 +30,16 @@ pub mod ring;
 use core::ffi::CStr;
 
 use firmware::controller::Config;
+use firmware::reset::Stop;
 use protocol::bus::TransmitError;
 use protocol::frame::{CanFrame, ExtendedId, FrameKind, Id, StandardId};
+use protocol::messages::ResetReason;
 use serde::{Deserialize, Serialize};
 
-/// FIFO that the host writes and the board reads.
-pub const TO_BOARD: &CStr = c"to-board";
+/// FIFO that the host writes and the board reads. Both can be opened again after a reset.
+pub const TO_BOARD: &CStr = c"/dev/stdin";
 /// FIFO that the board writes and the host reads.
-pub const FROM_BOARD: &CStr = c"from-board";
+pub const FROM_BOARD: &CStr = c"/dev/stdout";
 
 /// Bytes of the setup record; more than any setup takes, the rest is zero.
 pub const SETUP_LEN: usize = 768;
@@ -46,6 +49,9 @@ pub const FRAME_LEN: usize = 72;
 pub const REQUEST_LEN: usize = 9 + FRAME_LEN;
 /// Bytes of a reply before its frames: their number (4), a measured number (4).
 pub const REPLY_HEADER: usize = 8;
+/// Bytes of a greeting: where a reply has its number of frames, a number that none has; then, after a header's length,
+/// reason of the start (1), pins (2), reserved (1), address (4), status (4).
+pub const GREETING_LEN: usize = REPLY_HEADER + 12;
 /// Frames that one poll may send: one control sample sends a handful, its reply queue at most eight more.
 pub const REPLY_FRAMES: usize = 16;
 
@@ -108,12 +114,50 @@ pub enum Request {
     },
     /// Report the most stack used so far: an answer without frames, with bytes instead of ticks.
     Stack,
+    /// Fail. There is no answer but the greeting of the next start.
+    Plant(Fault),
+}
+
+/// A fault that the image made for it plants into itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Fault {
+    /// An instruction that does not exist.
+    HardFault,
+    /// A function that calls itself for ever.
+    StackOverflow,
+    /// The same in an interrupt.
+    OverflowInInterrupt,
+    /// A panic.
+    Panic,
+}
+
+impl Fault {
+    /// Every fault.
+    pub const ALL: [Self; 4] = [
+        Self::HardFault,
+        Self::StackOverflow,
+        Self::OverflowInInterrupt,
+        Self::Panic,
+    ];
+
+    /// Name, lower case with hyphens.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::HardFault => "hard-fault",
+            Self::StackOverflow => "stack-overflow",
+            Self::OverflowInInterrupt => "overflow-in-interrupt",
+            Self::Panic => "panic",
+        }
+    }
 }
 
 /// First byte of a request.
 const POLL: u8 = 0;
 const POLL_WITH_FRAME: u8 = 1;
 const STACK: u8 = 2;
+const PLANT: u8 = 3;
 
 impl Request {
     /// The record.
@@ -134,6 +178,7 @@ impl Request {
                 put(&mut bytes, 9, &frame_to_bytes(frame));
             }
             Self::Stack => put(&mut bytes, 0, &[STACK]),
+            Self::Plant(fault) => put(&mut bytes, 0, &[PLANT, *fault as u8]),
         }
         bytes
     }
@@ -151,6 +196,11 @@ impl Request {
                 Some(Self::Poll { now, frame })
             }
             STACK => Some(Self::Stack),
+            PLANT => {
+                let (&fault, _) = rest.split_first()?;
+                let fault = Fault::ALL.get(usize::from(fault))?;
+                Some(Self::Plant(*fault))
+            }
             _ => None,
         }
     }
@@ -218,6 +268,39 @@ pub fn reply_header(header: [u8; REPLY_HEADER]) -> (u32, u32) {
         u32::from_le_bytes([a, b, c, d]),
         u32::from_le_bytes([e, f, g, h]),
     )
+}
+
+/// Number of frames that no reply has.
+const GREETING: u32 = u32::MAX;
+
+/// What the board says at every start: how it ended before.
+#[must_use]
+pub fn greeting(last: &Stop) -> [u8; GREETING_LEN] {
+    let mut bytes = [0; GREETING_LEN];
+    put(&mut bytes, 0, &GREETING.to_le_bytes());
+    put(&mut bytes, REPLY_HEADER, &[last.reason.code()]);
+    put(&mut bytes, REPLY_HEADER + 1, &last.pins);
+    put(&mut bytes, REPLY_HEADER + 4, &last.at.to_le_bytes());
+    put(&mut bytes, REPLY_HEADER + 8, &last.status.to_le_bytes());
+    bytes
+}
+
+/// Whether what follows this header is the rest of a greeting, and not a reply.
+#[must_use]
+pub fn is_greeting(header: [u8; REPLY_HEADER]) -> bool {
+    reply_header(header).0 == GREETING
+}
+
+/// The stop in the rest of a greeting, or `None` if there is none.
+#[must_use]
+pub fn greeted(rest: &[u8; GREETING_LEN - REPLY_HEADER]) -> Option<Stop> {
+    let [reason, found, left, _, a, b, c, d, e, f, g, h] = *rest;
+    Some(Stop {
+        reason: ResetReason::try_from(reason).ok()?,
+        pins: [found, left],
+        at: u32::from_le_bytes([a, b, c, d]),
+        status: u32::from_le_bytes([e, f, g, h]),
+    })
 }
 
 /// A frame as `struct canfd_frame`.
@@ -350,6 +433,34 @@ mod tests {
             let setup = Setup { channel, config };
             assert_eq!(Setup::from_bytes(&setup.to_bytes().unwrap()), Some(setup));
         }
+    }
+
+    #[test]
+    fn every_planted_fault_comes_back() {
+        for fault in Fault::ALL {
+            let request = Request::Plant(fault);
+            assert_eq!(Request::from_bytes(&request.to_bytes()), Some(request));
+        }
+        let mut bytes = Request::Plant(Fault::Panic).to_bytes();
+        bytes[1] += 1;
+        assert_eq!(Request::from_bytes(&bytes), None);
+    }
+
+    #[test]
+    fn a_greeting_comes_back_and_is_no_reply() {
+        let stop = Stop {
+            reason: ResetReason::HardFault,
+            pins: [7, 8],
+            at: 0x0102_0304,
+            status: 0x8000_0010,
+        };
+        let bytes = greeting(&stop);
+        let (header, rest) = bytes.split_first_chunk().unwrap();
+        assert!(is_greeting(*header));
+        assert_eq!(greeted(rest.first_chunk().unwrap()), Some(stop));
+        assert!(!is_greeting(
+            *Reply::new().finish(u32::MAX).first_chunk().unwrap()
+        ));
     }
 
     #[test]

@@ -6,7 +6,7 @@ mod safe;
 
 use core::sync::atomic::Ordering;
 
-use cortex_m::peripheral::{DWT, SCB};
+use cortex_m::peripheral::DWT;
 use cortex_m_rt::entry;
 use defmt_rtt as _;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
@@ -14,8 +14,9 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use firmware::arm::IRB_930;
 use firmware::cabinet::Cabinet;
 use firmware::controller::Config;
+use firmware::journal::Journal;
 use firmware::node::Node;
-use protocol::messages::Mode;
+use protocol::messages::ResetReason;
 
 use can::{Can, Port, Received, ToSend};
 use clock::{CYCLES_PER_TICK, Clock, TICK};
@@ -32,11 +33,13 @@ fn main() -> ! {
     static mut TO_SEND: ToSend = ToSend::new();
     static mut RECEIVED: Received = Received::new();
 
+    cortex_m4::guard();
     let board = embassy_stm32::init(clock::config());
     // First of all: whatever hangs from here on ends in a reset, and a reset lets go of every pin.
     let mut watchdog = IndependentWatchdog::new(board.IWDG, WATCHDOG_US);
     watchdog.unleash();
-    safe::log_reset_reason();
+    let last = safe::last_stop();
+    let mut journal = Journal::begin(&last);
 
     let mut cabinet = Cabinet {
         brake: Output::new(board.PC0, Level::Low, Speed::Low),
@@ -47,10 +50,9 @@ fn main() -> ! {
         estop: Input::new(board.PC4, Pull::Down),
     };
     let can = Can::start(board.FDCAN1, board.PA11, board.PA12, TO_SEND, RECEIVED);
-    let node = NODE.insert(Node::new(Config::new(IRB_930, TICK)));
+    let node = NODE.insert(Node::new(Config::new(IRB_930, TICK), last.reason));
     let mut clock = Clock::start();
     let mut port = Port::new(can);
-    let mut mode = Mode::Boot;
     let mut worst = 0;
     loop {
         let ticked = clock.advance();
@@ -61,6 +63,7 @@ fn main() -> ! {
             let before = DWT::cycle_count();
             node.poll(clock.now(), &mut port);
             let cycles = DWT::cycle_count().wrapping_sub(before);
+            node.note_tick(cycles);
             if cycles > CYCLES_PER_TICK {
                 node.count_overrun();
             }
@@ -68,16 +71,15 @@ fn main() -> ! {
                 worst = cycles;
                 defmt::info!("worst call of the node so far: {} cycles", worst);
             }
-            if port.reset_asked() {
-                safe::torque_off();
-                SCB::sys_reset();
+            if node.reset_asked() {
+                cortex_m4::restart(ResetReason::Software);
             }
             let controller = node.controller();
-            if controller.mode() != mode {
-                mode = controller.mode();
-                defmt::info!("{} ({})", mode, controller.cause());
-            }
-            if cabinet.show(mode, controller.control_word()).is_err() {
+            journal.note(controller);
+            if cabinet
+                .show(controller.mode(), controller.control_word())
+                .is_err()
+            {
                 defmt::error!("a pin does not do what it is told");
             }
         }

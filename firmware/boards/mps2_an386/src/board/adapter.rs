@@ -5,13 +5,16 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use firmware::journal::Journal;
 use firmware::node::Node;
 use firmware::sample_clock::SampleClock;
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
 use protocol::slcan::{Line, Parser, Text};
 
-use super::uart::{self, RECEIVED};
+use super::pins::Pins;
+use super::settle;
+use super::uart::{FRAMES, RECEIVED};
 
 /// Wraps of SysTick, 2^24 counts of 40 ns each, without a byte after which the host has gone: 20 s.
 const SILENCE: u32 = 30;
@@ -28,7 +31,7 @@ pub fn wrapped() {
 
 /// Speaks slcan until the host closes the bus or is silent for [`SILENCE`].
 #[inline(never)]
-pub fn serve(node: &mut Node, period_ns: u64) {
+pub fn serve(node: &mut Node, pins: &mut Pins, journal: &mut Journal, period_ns: u64) {
     let mut clock = SampleClock::new(period_ns);
     let mut parser = Parser::new();
     let mut open = false;
@@ -38,6 +41,7 @@ pub fn serve(node: &mut Node, period_ns: u64) {
             Some(Ok(Line::Frame(frame))) if open => {
                 clock.observe(&frame);
                 node.poll(clock.now(), &mut Port(Some(frame)));
+                settle(node, clock.now(), pins, journal);
                 Line::Empty
             }
             Some(Ok(Line::Open)) => {
@@ -51,7 +55,7 @@ pub fn serve(node: &mut Node, period_ns: u64) {
             }
             Some(_) => Line::Refused,
         };
-        uart::send(Text::from(answer).as_bytes());
+        FRAMES.send(Text::from(answer).as_bytes());
     }
 }
 
@@ -81,7 +85,7 @@ impl Bus for Port {
     }
 
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
-        uart::send(Text::from(Line::Frame(*frame)).as_bytes());
+        FRAMES.send(Text::from(Line::Frame(*frame)).as_bytes());
         Ok(())
     }
 }

@@ -1,4 +1,4 @@
-//! UART 0 of the board: Arm's CMSDK APB UART (*Cortex-M System Design Kit*, DDI 0479, 4.3).
+//! The UARTs of the board: Arm's CMSDK APB UART (*Cortex-M System Design Kit*, DDI 0479, 4.3).
 //!
 //! Bytes that come interrupt; what goes out waits for room in the one-byte transmit buffer.
 
@@ -6,14 +6,20 @@ use core::ptr;
 
 use mps2_an386::ring::Ring;
 
-/// Interrupt that a received byte raises.
+/// UART 0, which carries frames.
+pub const FRAMES: Uart = Uart(0x4000_4000);
+/// UART 1, which carries the log. It is only sent to.
+pub const LOG: Uart = Uart(0x4000_5000);
+
+/// Interrupt that a byte received by UART 0 raises.
 pub const RECEIVE_IRQ: i16 = 0;
 
-const DATA: *mut u32 = 0x4000_4000 as *mut u32;
-const STATE: *mut u32 = 0x4000_4004 as *mut u32;
-const CTRL: *mut u32 = 0x4000_4008 as *mut u32;
-const INTCLEAR: *mut u32 = 0x4000_400C as *mut u32;
-const BAUDDIV: *mut u32 = 0x4000_4010 as *mut u32;
+// Registers, by their distance from the first.
+const DATA: usize = 0x0;
+const STATE: usize = 0x4;
+const CTRL: usize = 0x8;
+const INTCLEAR: usize = 0xC;
+const BAUDDIV: usize = 0x10;
 
 const STATE_TX_FULL: u32 = 1 << 0;
 const STATE_RX_FULL: u32 = 1 << 1;
@@ -26,44 +32,55 @@ const INT_RX: u32 = 1 << 1;
 /// Smallest divider: 25 MHz / 16.
 const FASTEST: u32 = 16;
 
-/// Bytes received and not yet taken.
+/// Bytes that UART 0 has received and nobody has taken yet.
 pub static RECEIVED: Ring = Ring::new();
 
-/// Starts the UART with its receive interrupt. Call it once.
-pub fn start() {
-    // SAFETY: registers of UART 0, which nothing else touches before its interrupt is enabled; the interrupt has no
-    // priority to change and shares nothing but atomics.
-    unsafe {
-        ptr::write_volatile(BAUDDIV, FASTEST);
-        ptr::write_volatile(CTRL, CTRL_TX | CTRL_RX | CTRL_RX_INTERRUPT);
-        (*cortex_m::peripheral::NVIC::PTR).iser[0].write(1 << RECEIVE_IRQ);
+/// A UART, by its address. Only the two above exist.
+pub struct Uart(usize);
+
+impl Uart {
+    fn read(&self, register: usize) -> u32 {
+        // SAFETY: a register of a UART. Reading DATA takes a byte, which only the receive interrupt does.
+        unsafe { ptr::read_volatile((self.0 + register) as *const u32) }
+    }
+
+    fn write(&self, register: usize, value: u32) {
+        // SAFETY: a register of a UART; no value of it touches memory.
+        unsafe { ptr::write_volatile((self.0 + register) as *mut u32, value) }
+    }
+
+    /// Starts the transmitter.
+    pub fn start(&self) {
+        self.write(BAUDDIV, FASTEST);
+        self.write(CTRL, CTRL_TX);
+    }
+
+    /// Starts receiver and transmitter with the receive interrupt.
+    pub fn start_receiving(&self) {
+        self.write(BAUDDIV, FASTEST);
+        self.write(CTRL, CTRL_TX | CTRL_RX | CTRL_RX_INTERRUPT);
+        // SAFETY: the interrupt has no priority to change and shares nothing but atomics.
+        unsafe { (*cortex_m::peripheral::NVIC::PTR).iser[0].write(1 << RECEIVE_IRQ) };
+    }
+
+    /// Sends bytes, each as soon as there is room.
+    pub fn send(&self, bytes: &[u8]) {
+        for &byte in bytes {
+            while self.read(STATE) & STATE_TX_FULL != 0 {}
+            self.write(DATA, u32::from(byte));
+        }
     }
 }
 
-/// The receive interrupt.
+/// The receive interrupt of UART 0. STATE and INTCLEAR clear what is written as 1.
 pub fn receive() {
-    // SAFETY: registers of UART 0. Reading DATA takes the byte; STATE and INTCLEAR clear what is written as 1. Nothing
-    // but this interrupt reads or writes them.
-    unsafe {
-        ptr::write_volatile(INTCLEAR, INT_RX);
-        let state = ptr::read_volatile(STATE);
-        if state & STATE_RX_OVERRUN != 0 {
-            ptr::write_volatile(STATE, STATE_RX_OVERRUN);
-            RECEIVED.lose();
-        }
-        if state & STATE_RX_FULL != 0 {
-            RECEIVED.push(ptr::read_volatile(DATA) as u8);
-        }
+    FRAMES.write(INTCLEAR, INT_RX);
+    let state = FRAMES.read(STATE);
+    if state & STATE_RX_OVERRUN != 0 {
+        FRAMES.write(STATE, STATE_RX_OVERRUN);
+        RECEIVED.lose();
     }
-}
-
-/// Sends bytes, each as soon as there is room.
-pub fn send(bytes: &[u8]) {
-    for &byte in bytes {
-        // SAFETY: registers of UART 0; only this function, which no interrupt calls, writes DATA.
-        unsafe {
-            while ptr::read_volatile(STATE) & STATE_TX_FULL != 0 {}
-            ptr::write_volatile(DATA, u32::from(byte));
-        }
+    if state & STATE_RX_FULL != 0 {
+        RECEIVED.push(FRAMES.read(DATA) as u8);
     }
 }

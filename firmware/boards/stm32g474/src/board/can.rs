@@ -18,7 +18,7 @@ use embassy_stm32::{Peri, bind_interrupts, pac};
 use protocol::bus::{Bus, TransmitError};
 use protocol::codec;
 use protocol::frame::{CanFrame, FrameKind, StandardId};
-use protocol::messages::{EStop, EStopReason, Message, NmtCommand, Node as Name};
+use protocol::messages::{EStop, EStopReason, Message};
 use protocol::table;
 
 /// Queue of frames received.
@@ -131,7 +131,6 @@ pub struct Port {
     estop: bool,
     /// The emergency-stop chain has opened, and the node has not been told.
     estop_due: bool,
-    reset_asked: bool,
     offline: bool,
 }
 
@@ -142,14 +141,8 @@ impl Port {
             next: None,
             estop: false,
             estop_due: false,
-            reset_asked: false,
             offline: false,
         }
-    }
-
-    /// Network management has asked for a reset.
-    pub fn reset_asked(&self) -> bool {
-        self.reset_asked
     }
 
     /// Notes the emergency-stop chain. While it is open the node hears so in every call; the other nodes hear it once,
@@ -186,11 +179,7 @@ impl Bus for Port {
             return estop_frame();
         }
         self.has_frames();
-        let frame = self.next.take()?;
-        if is_reset(&frame) {
-            self.reset_asked = true;
-        }
-        Some(frame)
+        self.next.take()
     }
 
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
@@ -217,16 +206,6 @@ fn estop_frame() -> Option<CanFrame> {
         counter: 0,
     };
     codec::encode(&Message::EStop(estop), 0).ok()
-}
-
-fn is_reset(frame: &CanFrame) -> bool {
-    let Ok(received) = codec::decode(frame) else {
-        return false;
-    };
-    let Message::Nmt(nmt) = received.message else {
-        return false;
-    };
-    nmt.command == NmtCommand::ResetNode && (nmt.node == 0 || nmt.node == Name::Controller.code())
 }
 
 /// A frame as received; `None` for a remote frame, which the filters do not let through.

@@ -1,4 +1,4 @@
-//! Hands the linker the memory map of the board, on the target only.
+//! Hands the linker the memory map of a board, on the target only.
 
 use std::path::Path;
 use std::{env, fs};
@@ -11,8 +11,8 @@ fn main() -> std::io::Result<()> {
     let out = env::var_os("OUT_DIR").ok_or(std::io::ErrorKind::NotFound)?;
     fs::copy("memory.x", Path::new(&out).join("memory.x"))?;
     println!("cargo::rustc-link-search={}", Path::new(&out).display());
-    for script in ["link.x", "defmt.x"] {
-        println!("cargo::rustc-link-arg-bins=-T{script}");
-    }
+    println!("cargo::rustc-link-arg=-Tlink.x");
+    // The examples log nothing.
+    println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
     Ok(())
 }

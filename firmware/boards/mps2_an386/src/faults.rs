@@ -1,0 +1,63 @@
+//! The controller with faults that the host can plant: the proof that every one of them ends with torque off and its
+//! reason reported. On any other target than the board this is an empty program.
+
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod board;
+
+#[cfg(target_os = "none")]
+mod planted {
+    use core::hint::black_box;
+    use core::panic::PanicInfo;
+
+    use cortex_m::asm;
+    use cortex_m::peripheral::SCB;
+    use cortex_m_rt::exception;
+    use mps2_an386::Fault;
+    use protocol::messages::ResetReason;
+
+    use crate::board::End;
+
+    /// Does what the host asks for.
+    pub fn plant(fault: Fault) -> Result<(), End> {
+        defmt::warn!("planted: {=str}", fault.name());
+        match fault {
+            Fault::HardFault => asm::udf(),
+            Fault::Panic => panic!("planted"),
+            Fault::StackOverflow => {
+                overflow(0);
+            }
+            Fault::OverflowInInterrupt => {
+                SCB::set_pendsv();
+                asm::isb();
+            }
+        }
+        // Whoever gets here has found a fault that is none.
+        Err(End)
+    }
+
+    #[exception]
+    fn PendSV() {
+        overflow(0);
+    }
+
+    /// Calls itself for ever. Each call has something to do after the next one, so that it is no loop.
+    #[inline(never)]
+    #[expect(unconditional_recursion)]
+    fn overflow(depth: u32) -> u32 {
+        let words = black_box([depth; 16]);
+        overflow(depth.wrapping_add(1)) ^ black_box(words)[0]
+    }
+
+    #[panic_handler]
+    fn panic(_: &PanicInfo<'_>) -> ! {
+        cortex_m4::restart(ResetReason::Panic)
+    }
+}
+
+#[cfg(target_os = "none")]
+use planted::plant;
+
+#[cfg(not(target_os = "none"))]
+fn main() {}

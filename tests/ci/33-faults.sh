@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# Hard fault, stack overflow, panic and reset of the controller on the Cortex-M4F end with torque off, and their reason is
+# reported after the restart.
+. "$(dirname "$0")/30-board.bash"
+
+echo "- every fault, planted into a moving arm"
+faults=$(built mps2-an386 --bin mps2-an386-faults)
+timeout 120 "$plant_sim" faults --image "$faults"
+
+echo "- the image that goes into runs obeys no request to fail, only network management's reset; that is seen"
+image=$(built mps2-an386 --bin mps2-an386)
+if timeout 120 "$plant_sim" faults --image "$image" >"$scratch/production" 2>&1; then
+    echo "33-faults: the production image has planted faults" >&2
+    exit 1
+fi
+[ "$(grep -c 'FAILED: the controller in QEMU ended' "$scratch/production")" = 4 ]
+grep -q '^software-reset  *0111 > 1000  *software ' "$scratch/production"
