@@ -11,10 +11,11 @@ use std::rc::Rc;
 
 use firmware::controller::Config;
 use firmware::node::Node;
+use firmware::phase::Phase;
 use firmware::reset::Stop;
 use firmware::sample_clock::SampleClock;
 pub use mps2_an386::Channel;
-use mps2_an386::{Fault, Request, Setup};
+use mps2_an386::{Fault, Measured, Request, Setup};
 use protocol::frame::CanFrame;
 
 use crate::endpoint::{Endpoint, EndpointError, InProcess};
@@ -29,12 +30,12 @@ pub struct Options {
     pub channel: Channel,
     /// Count instructions: the emulated clock then moves by instructions and by nothing else. Slower, and
     /// over the FIFOs only.
-    pub count: Option<Rc<RefCell<Measured>>>,
+    pub count: Option<Rc<RefCell<Costs>>>,
 }
 
 /// What a run has cost the board.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Measured {
+pub struct Costs {
     /// Every call of the node.
     pub polls: Vec<Poll>,
     /// Most stack used, bytes.
@@ -46,6 +47,8 @@ pub struct Measured {
 pub struct Poll {
     /// Instructions from frame in to frames out.
     pub instructions: u32,
+    /// Instructions of each phase, zeros from an image that does not tell them apart.
+    pub phases: [u32; Phase::ALL.len()],
     /// Identifier of the frame that came, if any.
     pub received: Option<u32>,
     /// Whether a move was being planned.
@@ -56,6 +59,8 @@ pub struct Poll {
 pub const IMAGE: &str = "mps2-an386";
 /// See [`IMAGE`].
 pub const FAULTS_IMAGE: &str = "mps2-an386-faults";
+/// The image that measures the phases of a call.
+pub const COST_IMAGE: &str = "mps2-an386-cost";
 
 /// Builds an image from the sources; returns where it is.
 ///
@@ -76,7 +81,7 @@ pub struct Qemu {
     period_ns: u64,
     /// How the board ended when it last started again.
     last_stop: Option<Stop>,
-    count: Option<Rc<RefCell<Measured>>>,
+    count: Option<Rc<RefCell<Costs>>>,
 }
 
 impl Qemu {
@@ -145,7 +150,7 @@ impl Qemu {
         if let Some(count) = self.count.take()
             && let Ok(stack) = self.board.ask(&Request::Stack, &mut Vec::new())
         {
-            count.borrow_mut().stack = stack;
+            count.borrow_mut().stack = stack.number;
         }
     }
 }
@@ -175,10 +180,10 @@ impl Endpoint for Qemu {
         if self.twin.node().reset_asked() {
             return self.reset(now, frame);
         }
-        let ticks = match received {
+        let measured = match received {
             Some(frame) if self.clock.is_some() => {
                 self.board.exchange(frame, sent)?;
-                0
+                Measured::default()
             }
             _ => self.board.ask(&Request::Poll { now, frame }, sent)?,
         };
@@ -187,7 +192,8 @@ impl Endpoint for Qemu {
         }
         if let Some(count) = &self.count {
             count.borrow_mut().polls.push(Poll {
-                instructions: board::instructions(ticks),
+                instructions: board::instructions(measured.number),
+                phases: measured.phases.map(board::instructions),
                 received: received.map(CanFrame::raw_id),
                 planning: planning || self.twin.node().controller().is_planning(),
             });

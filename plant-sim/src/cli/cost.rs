@@ -7,12 +7,14 @@ use std::process::ExitCode;
 use std::rc::Rc;
 
 use clap::Args;
+use firmware::phase::Phase;
 use plant_sim::model::RobotModel;
-use plant_sim::qemu::{Channel, Measured, Options, Poll, Qemu};
+use plant_sim::qemu::{self, COST_IMAGE, Channel, Costs, IMAGE, Options, Poll, Qemu};
 use plant_sim::run::{self, RunConfig};
 use plant_sim::scenario::Scenario;
 use plant_sim::selection::LawChoice;
 use protocol::table::FEEDBACK;
+use serde::Serialize;
 
 use super::show;
 
@@ -29,14 +31,37 @@ pub struct CostArgs {
         default_value = "computed-torque-task:observer"
     )]
     law: LawChoice,
-    /// The image, instead of the one built from the sources.
+    /// The image of the controller, instead of the one built from the sources.
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
+    /// The image that tells phases apart, instead of the one built from the sources.
+    #[arg(long, value_name = "FILE")]
+    cost_image: Option<PathBuf>,
+    /// Print the figures as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
-/// Runs two cycles and shows instructions by kind of call: the second is planned while the first
-/// is still running. The count is that of the emulator, the same in every run.
+/// Runs two cycles with either image and shows instructions by kind of call and by phase: the second cycle is planned
+/// while the first is still running. The count is that of the emulator, the same in every run.
 pub fn run(args: &CostArgs) -> Result<ExitCode, String> {
+    let whole = measure(args, args.image.as_ref(), IMAGE)?;
+    let parts = measure(args, args.cost_image.as_ref(), COST_IMAGE)?;
+    let report = Report::new(&whole, &parts);
+    if args.json {
+        let json = serde_json::to_string_pretty(&report).map_err(|error| error.to_string())?;
+        show(&(json + "\n"))?;
+    } else {
+        show(&report.text())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn measure(args: &CostArgs, image: Option<&PathBuf>, program: &str) -> Result<Costs, String> {
+    let image = match image {
+        Some(image) => image.clone(),
+        None => qemu::build(program).map_err(|error| error.to_string())?,
+    };
     let mut scenario = Scenario::open(&args.scenario).map_err(|error| error.to_string())?;
     scenario.law = args.law;
     scenario.cycles = 2;
@@ -47,50 +72,120 @@ pub fn run(args: &CostArgs) -> Result<ExitCode, String> {
         model,
         seed: 1,
     };
-    let measured = Rc::new(RefCell::new(Measured::default()));
+    let costs = Rc::new(RefCell::new(Costs::default()));
     let options = Options {
-        image: args.image.clone(),
+        image: Some(image),
         channel: Channel::Fifo,
-        count: Some(Rc::clone(&measured)),
+        count: Some(Rc::clone(&costs)),
     };
     let summary = run::execute_with(&config, None, |config| Qemu::start(config, &options))
         .map_err(|error| error.to_string())?;
-    show(&report(&measured.borrow()))?;
-    match summary.error {
-        None => Ok(ExitCode::SUCCESS),
-        Some(error) => Err(format!("the run was not completed: {error}")),
+    if let Some(error) = summary.error {
+        return Err(format!("the run was not completed: {error}"));
+    }
+    Ok(costs.take())
+}
+
+/// Instructions by kind of call and by phase.
+#[derive(Serialize)]
+struct Report {
+    calls: Vec<Row>,
+    phases: Vec<Row>,
+    /// Most stack used, bytes.
+    stack: u32,
+}
+
+/// Instructions of calls of one kind, or of one phase of them.
+#[derive(Serialize)]
+struct Row {
+    name: &'static str,
+    calls: usize,
+    min: u32,
+    median: u32,
+    max: u32,
+}
+
+impl Report {
+    fn new(whole: &Costs, parts: &Costs) -> Self {
+        let calls = KINDS.into_iter().filter_map(|name| {
+            let of_kind = |(index, poll): (usize, &Poll)| {
+                (kind(index, poll) == name).then_some(poll.instructions)
+            };
+            row(name, whole.polls.iter().enumerate().filter_map(of_kind))
+        });
+        let phases = Phase::ALL.into_iter().filter_map(|phase| {
+            let of_phase = |(index, poll): (usize, &Poll)| {
+                let counts = match phase {
+                    Phase::Planning => kind(index, poll) == "sample_planning",
+                    // Without torque there is no law, and little else.
+                    _ => poll.phases[Phase::Law as usize] > 0,
+                };
+                counts.then_some(poll.phases[phase as usize])
+            };
+            row(
+                phase.name(),
+                parts.polls.iter().enumerate().filter_map(of_phase),
+            )
+        });
+        Self {
+            calls: calls.collect(),
+            phases: phases.collect(),
+            stack: whole.stack,
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        for (what, rows) in [("call", &self.calls), ("phase", &self.phases)] {
+            let _ = writeln!(
+                text,
+                "{what:<16} calls    min  median     max   instructions"
+            );
+            for row in rows {
+                let Row {
+                    name,
+                    calls,
+                    min,
+                    median,
+                    max,
+                } = row;
+                let _ = writeln!(text, "{name:<16} {calls:>5} {min:>6} {median:>7} {max:>7}");
+            }
+        }
+        let _ = writeln!(text, "stack {} bytes", self.stack);
+        text
     }
 }
 
-/// Kinds of call, as the report names them.
-const KINDS: [&str; 4] = ["sample", "sample_planning", "other_frame", "no_frame"];
+/// Least, middle and greatest of the counts; `None` where there are none.
+fn row(name: &'static str, counts: impl Iterator<Item = u32>) -> Option<Row> {
+    let mut counts: Vec<u32> = counts.collect();
+    counts.sort_unstable();
+    Some(Row {
+        name,
+        calls: counts.len(),
+        min: *counts.first()?,
+        median: counts[counts.len() / 2],
+        max: *counts.last()?,
+    })
+}
 
-fn kind(poll: &Poll) -> &'static str {
+/// Kinds of call, as the report names them.
+const KINDS: [&str; 5] = [
+    "start",
+    "sample",
+    "sample_planning",
+    "other_frame",
+    "no_frame",
+];
+
+fn kind(index: usize, poll: &Poll) -> &'static str {
     match poll.received {
+        // The self-test is part of it.
+        _ if index == 0 => "start",
         None => "no_frame",
         Some(id) if id != u32::from(FEEDBACK.id) => "other_frame",
         Some(_) if poll.planning => "sample_planning",
         Some(_) => "sample",
     }
-}
-
-/// One line a kind of call, and the stack.
-fn report(measured: &Measured) -> String {
-    let mut text = String::from("call              calls    min  median     max   instructions\n");
-    for name in KINDS {
-        let mut counts: Vec<u32> = measured
-            .polls
-            .iter()
-            .filter(|poll| kind(poll) == name)
-            .map(|poll| poll.instructions)
-            .collect();
-        counts.sort_unstable();
-        if let (Some(min), Some(max)) = (counts.first(), counts.last()) {
-            let median = counts[counts.len() / 2];
-            let calls = counts.len();
-            let _ = writeln!(text, "{name:<16} {calls:>6} {min:>6} {median:>7} {max:>7}");
-        }
-    }
-    let _ = writeln!(text, "stack {} bytes", measured.stack);
-    text
 }

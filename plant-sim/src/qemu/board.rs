@@ -16,8 +16,8 @@ use std::time::Duration;
 
 use firmware::reset::Stop;
 use mps2_an386::{
-    Channel, FRAME_LEN, GREETING_LEN, REPLY_HEADER, Request, SETUP_LEN, Setup, frame_from_bytes,
-    greeted, is_greeting, reply_header,
+    Channel, FRAME_LEN, GREETING_LEN, Measured, REPLY_HEADER, Request, SETUP_LEN, Setup,
+    frame_from_bytes, greeted, is_greeting, reply_header,
 };
 use protocol::frame::CanFrame;
 
@@ -194,7 +194,7 @@ impl Board {
     /// Closes the bus on the UART; returns how many bytes the board's receiver has lost.
     pub fn close_bus(&mut self) -> Result<u32, EndpointError> {
         self.serial(Serial::close)?;
-        self.answer(&mut Vec::new())
+        Ok(self.answer(&mut Vec::new())?.number)
     }
 
     fn serial<T>(
@@ -207,12 +207,12 @@ impl Board {
         })
     }
 
-    /// Asks and waits for the answer: appends its frames to `sent` and returns its number.
+    /// Asks and waits for the answer: appends its frames to `sent` and returns what was measured.
     pub fn ask(
         &mut self,
         request: &Request,
         sent: &mut Vec<CanFrame>,
-    ) -> Result<u32, EndpointError> {
+    ) -> Result<Measured, EndpointError> {
         self.tell(request)?;
         self.answer(sent)
     }
@@ -222,7 +222,7 @@ impl Board {
         self.say(&request.to_bytes())
     }
 
-    fn answer(&mut self, sent: &mut Vec<CanFrame>) -> Result<u32, EndpointError> {
+    fn answer(&mut self, sent: &mut Vec<CanFrame>) -> Result<Measured, EndpointError> {
         match self.wait(|board| listen(&mut board.replies, sent))? {
             Said::Reply(measured) => Ok(measured),
             Said::Greeting(stop) => Err(failure(format!(
@@ -289,8 +289,8 @@ impl Drop for Board {
 
 /// What the board says on its FIFO.
 enum Said {
-    /// An answer, with its number.
-    Reply(u32),
+    /// An answer, with what was measured.
+    Reply(Measured),
     /// That it has started, and how it ended before.
     Greeting(Stop),
 }
@@ -299,14 +299,14 @@ enum Said {
 fn listen(replies: &mut impl Read, sent: &mut Vec<CanFrame>) -> io::Result<Said> {
     let mut header = [0; REPLY_HEADER];
     replies.read_exact(&mut header)?;
-    if is_greeting(header) {
+    if is_greeting(&header) {
         let mut rest = [0; GREETING_LEN - REPLY_HEADER];
         replies.read_exact(&mut rest)?;
         return greeted(&rest)
             .map(Said::Greeting)
             .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, "no reason of its start"));
     }
-    let (count, measured) = reply_header(header);
+    let (count, measured) = reply_header(&header);
     for _ in 0..count {
         let mut record = [0; FRAME_LEN];
         replies.read_exact(&mut record)?;
@@ -389,9 +389,12 @@ mod tests {
     #[test]
     fn a_greeting_is_no_answer() {
         let stop = Stop::without_fault(ResetReason::Watchdog);
-        let mut said = &[Reply::new().finish(7), &greeting(&stop)].concat()[..];
+        let mut said = &[Reply::new().finish(&7.into()), &greeting(&stop)].concat()[..];
         let mut listen = || listen(&mut said, &mut Vec::new());
-        assert!(matches!(listen(), Ok(Said::Reply(7))));
+        assert!(matches!(
+            listen(),
+            Ok(Said::Reply(Measured { number: 7, .. }))
+        ));
         assert!(matches!(listen(), Ok(Said::Greeting(last)) if last == stop));
         assert!(listen().is_err());
     }

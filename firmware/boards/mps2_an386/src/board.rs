@@ -15,9 +15,11 @@ use cortex_m_rt::{entry, exception};
 use firmware::controller::Config;
 use firmware::journal::Journal;
 use firmware::node::Node;
+use firmware::phase::Probe;
 use firmware::reset::Stop;
 use mps2_an386::{
-    Channel, FROM_BOARD, REQUEST_LEN, Reply, Request, SETUP_LEN, Setup, TO_BOARD, greeting,
+    Channel, FROM_BOARD, Fault, Measured, REQUEST_LEN, Reply, Request, SETUP_LEN, Setup, TO_BOARD,
+    greeting,
 };
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
@@ -26,6 +28,17 @@ use protocol::messages::ResetReason;
 pub use host::End;
 use host::File;
 use pins::Pins;
+
+/// What an image adds to the board: each has its own at its root.
+pub trait Image {
+    /// Measures the phases of a call of the node.
+    type Meter: Probe + Default + Into<Measured>;
+
+    /// Plants a fault. An image that plants none has been mistaken for another by a host that asks for one.
+    fn plant(_: Fault) -> Result<(), End> {
+        Err(End)
+    }
+}
 
 /// Greatest count of SysTick, which counts down.
 const SYST_MAX: u32 = 0x00FF_FFFF;
@@ -58,13 +71,13 @@ fn start(setup: &mut Option<Setup>, node: &mut Option<Node>, reply: &mut Reply) 
         uart::FRAMES.start_receiving();
     }
     // Tells the host that the node is there.
-    output.write(reply.finish(0))?;
+    output.write(reply.finish(&Measured::default()))?;
     match setup.channel {
         Channel::Fifo => serve(&input, &output, node, &mut pins, &mut journal, reply),
         Channel::Uart => {
             adapter::serve(node, &mut pins, &mut journal, setup.period_ns());
             reply.clear();
-            output.write(reply.finish(uart::RECEIVED.lost() as u32))
+            output.write(reply.finish(&(uart::RECEIVED.lost() as u32).into()))
         }
     }
 }
@@ -98,26 +111,35 @@ fn serve(
         reply.clear();
         let measured = match Request::from_bytes(&record).ok_or(End)? {
             Request::Poll { now, frame } => {
-                let ticks = poll(node, now, frame, reply);
+                let measured = poll(node, now, frame, reply);
                 settle(node, now, pins, journal);
-                ticks
+                measured
             }
-            Request::Stack => stack::used() as u32,
+            Request::Stack => (stack::used() as u32).into(),
             Request::Plant(fault) => {
-                crate::plant(fault)?;
-                0
+                crate::Image::plant(fault)?;
+                Measured::default()
             }
         };
-        output.write(reply.finish(measured))?;
+        output.write(reply.finish(&measured))?;
     }
     Ok(())
 }
 
 /// Calls the node; returns the timer ticks it took, up to 2^24.
-fn poll(node: &mut Node, now: u64, received: Option<CanFrame>, reply: &mut Reply) -> u32 {
+fn poll(node: &mut Node, now: u64, received: Option<CanFrame>, reply: &mut Reply) -> Measured {
     let mut port = Port { received, reply };
     let before = SYST::get_current();
-    node.poll(now, &mut port);
+    let mut meter = <crate::Image as Image>::Meter::default();
+    node.poll_with(now, &mut port, &mut meter);
+    Measured {
+        number: ticks_since(before),
+        ..meter.into()
+    }
+}
+
+/// Timer ticks since SysTick stood at `before`.
+pub fn ticks_since(before: u32) -> u32 {
     before.wrapping_sub(SYST::get_current()) & SYST_MAX
 }
 

@@ -17,24 +17,30 @@ mod planted {
     use mps2_an386::Fault;
     use protocol::messages::ResetReason;
 
-    use crate::board::End;
+    use crate::board::{self, End};
 
-    /// Does what the host asks for.
-    pub fn plant(fault: Fault) -> Result<(), End> {
-        defmt::warn!("planted: {=str}", fault.name());
-        match fault {
-            Fault::HardFault => asm::udf(),
-            Fault::Panic => panic!("planted"),
-            Fault::StackOverflow => {
-                overflow(0);
+    pub struct Image;
+
+    impl board::Image for Image {
+        type Meter = ();
+
+        /// Does what the host asks for.
+        fn plant(fault: Fault) -> Result<(), End> {
+            defmt::warn!("planted: {=str}", fault.name());
+            match fault {
+                Fault::HardFault => asm::udf(),
+                Fault::Panic => panic!("planted"),
+                Fault::StackOverflow => {
+                    overflow(0);
+                }
+                Fault::OverflowInInterrupt => {
+                    SCB::set_pendsv();
+                    asm::isb();
+                }
             }
-            Fault::OverflowInInterrupt => {
-                SCB::set_pendsv();
-                asm::isb();
-            }
+            // Whoever gets here has found a fault that is none.
+            Err(End)
         }
-        // Whoever gets here has found a fault that is none.
-        Err(End)
     }
 
     #[exception]
@@ -57,7 +63,7 @@ mod planted {
 }
 
 #[cfg(target_os = "none")]
-use planted::plant;
+use planted::Image;
 
 #[cfg(not(target_os = "none"))]
 fn main() {}

@@ -30,6 +30,7 @@ pub mod ring;
 use core::ffi::CStr;
 
 use firmware::controller::Config;
+use firmware::phase::Phase;
 use firmware::reset::Stop;
 use protocol::bus::TransmitError;
 use protocol::frame::{CanFrame, ExtendedId, FrameKind, Id, StandardId};
@@ -47,13 +48,16 @@ pub const SETUP_LEN: usize = 768;
 pub const FRAME_LEN: usize = 72;
 /// Bytes of a request: kind (1), time (8), frame.
 pub const REQUEST_LEN: usize = 9 + FRAME_LEN;
-/// Bytes of a reply before its frames: their number (4), a measured number (4).
-pub const REPLY_HEADER: usize = 8;
+/// Bytes of a reply before its frames: their number (4), a measured number (4), and one for each phase (4).
+pub const REPLY_HEADER: usize = 8 + 4 * PHASES;
 /// Bytes of a greeting: where a reply has its number of frames, a number that none has; then, after a header's length,
 /// reason of the start (1), pins (2), reserved (1), address (4), status (4).
 pub const GREETING_LEN: usize = REPLY_HEADER + 12;
 /// Frames that one poll may send: one control sample sends a handful, its reply queue at most eight more.
 pub const REPLY_FRAMES: usize = 16;
+
+/// Phases of a call of the node.
+const PHASES: usize = Phase::ALL.len();
 
 const EXTENDED: u32 = 1 << 31;
 const REMOTE: u32 = 1 << 30;
@@ -206,6 +210,31 @@ impl Request {
     }
 }
 
+/// What a request has measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Measured {
+    /// Timer ticks of a call of the node, or the number that was asked for.
+    pub number: u32,
+    /// Timer ticks of each phase of the call; zeros from an image that does not tell them apart.
+    pub phases: [u32; PHASES],
+}
+
+impl From<u32> for Measured {
+    fn from(number: u32) -> Self {
+        Self {
+            number,
+            phases: [0; PHASES],
+        }
+    }
+}
+
+/// Nothing measured.
+impl From<()> for Measured {
+    fn from((): ()) -> Self {
+        Self::default()
+    }
+}
+
 /// What the node sent in one call, as a record that grows.
 #[derive(Clone, Debug)]
 pub struct Reply {
@@ -250,24 +279,32 @@ impl Reply {
         Ok(())
     }
 
-    /// The record; `measured` is a number that the request asked for.
-    pub fn finish(&mut self, measured: u32) -> &[u8] {
-        put(&mut self.bytes, 0, &(self.frames as u32).to_le_bytes());
-        put(&mut self.bytes, 4, &measured.to_le_bytes());
+    /// The record, with what the request has measured.
+    pub fn finish(&mut self, measured: &Measured) -> &[u8] {
+        let numbers = [self.frames as u32, measured.number];
+        let words = numbers.iter().chain(&measured.phases);
+        for (place, word) in self.bytes.as_chunks_mut().0.iter_mut().zip(words) {
+            *place = word.to_le_bytes();
+        }
         self.bytes
             .get(..REPLY_HEADER + self.frames * FRAME_LEN)
             .unwrap_or_default()
     }
 }
 
-/// Number of frames and measured number in the header of a reply.
+/// Number of frames and what has been measured, in the header of a reply.
 #[must_use]
-pub fn reply_header(header: [u8; REPLY_HEADER]) -> (u32, u32) {
-    let [a, b, c, d, e, f, g, h] = header;
-    (
-        u32::from_le_bytes([a, b, c, d]),
-        u32::from_le_bytes([e, f, g, h]),
-    )
+pub fn reply_header(header: &[u8; REPLY_HEADER]) -> (u32, Measured) {
+    let mut words = header
+        .as_chunks()
+        .0
+        .iter()
+        .map(|word| u32::from_le_bytes(*word));
+    let mut next = || words.next().unwrap_or_default();
+    let frames = next();
+    let number = next();
+    let phases = [(); PHASES].map(|()| next());
+    (frames, Measured { number, phases })
 }
 
 /// Number of frames that no reply has.
@@ -287,7 +324,7 @@ pub fn greeting(last: &Stop) -> [u8; GREETING_LEN] {
 
 /// Whether what follows this header is the rest of a greeting, and not a reply.
 #[must_use]
-pub fn is_greeting(header: [u8; REPLY_HEADER]) -> bool {
+pub fn is_greeting(header: &[u8; REPLY_HEADER]) -> bool {
     reply_header(header).0 == GREETING
 }
 
@@ -456,10 +493,10 @@ mod tests {
         };
         let bytes = greeting(&stop);
         let (header, rest) = bytes.split_first_chunk().unwrap();
-        assert!(is_greeting(*header));
+        assert!(is_greeting(header));
         assert_eq!(greeted(rest.first_chunk().unwrap()), Some(stop));
         assert!(!is_greeting(
-            *Reply::new().finish(u32::MAX).first_chunk().unwrap()
+            Reply::new().finish(&u32::MAX.into()).first_chunk().unwrap()
         ));
     }
 
@@ -471,11 +508,16 @@ mod tests {
             reply.push(&frame).unwrap();
         }
         assert_eq!(reply.push(&frame), Err(TransmitError::QueueFull));
-        let bytes = reply.finish(9);
+        let mut measured = Measured::from(9);
+        measured.phases = [(); PHASES].map(|()| {
+            measured.number += 1;
+            measured.number
+        });
+        let bytes = reply.finish(&measured);
         assert_eq!(bytes.len(), REPLY_HEADER + REPLY_FRAMES * FRAME_LEN);
         assert_eq!(
-            reply_header(*bytes.first_chunk().unwrap()),
-            (REPLY_FRAMES as u32, 9)
+            reply_header(bytes.first_chunk().unwrap()),
+            (REPLY_FRAMES as u32, measured)
         );
     }
 }
