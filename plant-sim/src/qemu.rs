@@ -3,6 +3,7 @@
 mod board;
 mod difference;
 mod image;
+mod log;
 mod serial;
 
 use std::cell::RefCell;
@@ -73,6 +74,7 @@ pub fn build(program: &str) -> Result<PathBuf, EndpointError> {
 /// The controller in QEMU with its twin in this process.
 #[derive(Debug)]
 pub struct Qemu {
+    image: PathBuf,
     twin: InProcess,
     expected: Vec<CanFrame>,
     board: Board,
@@ -102,6 +104,7 @@ impl Qemu {
             twin: InProcess::new(config),
             expected: Vec::new(),
             board: Board::start(&image, &setup, options.count.is_some())?,
+            image,
             period_ns: setup.period_ns(),
             last_stop: None,
             clock: (setup.channel == Channel::Uart).then(|| SampleClock::new(setup.period_ns())),
@@ -125,6 +128,17 @@ impl Qemu {
     /// How the board ended when it last started again in this run.
     pub fn last_stop(&self) -> Option<Stop> {
         self.last_stop
+    }
+
+    /// Ends the emulation; returns what the board has logged, one message a line.
+    ///
+    /// # Errors
+    /// The log cannot be read.
+    pub fn take_log(&mut self) -> Result<String, String> {
+        self.say_goodbye();
+        let bytes = self.board.take_log().map_err(|error| error.to_string())?;
+        let image = std::fs::read(&self.image).map_err(|error| error.to_string())?;
+        log::decode(&image, &bytes)
     }
 
     /// Hands over the frame that resets the board, and follows it through its start.

@@ -35,6 +35,15 @@ for scenario in gate square pick-place; do
     echo "  $scenario: $(wc -l <"$scratch/board/trace.log") frames equal"
 done
 
+echo "- the log tells every change of mode, and nothing in it is damaged"
+for message in 'started: PowerOn' 'Enabled (None)' 'Moving (None)' 'Ready (None)'; do
+    grep -q "INFO $message" "$scratch/board/controller.log"
+done
+if grep ERROR "$scratch/board/controller.log"; then
+    echo "30-target: the log is damaged" >&2
+    exit 1
+fi
+
 echo "- an image that does not answer is reported, and nothing is left running"
 if timeout 60 "$plant_sim" run --controller qemu --image "$doubles" --out "$scratch/none" 2>"$scratch/hung"; then
     echo "30-target: an image without a controller ran a scenario" >&2

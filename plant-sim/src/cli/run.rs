@@ -1,6 +1,7 @@
 //! `plant-sim run`: a scenario from start to summary.
 
 use std::fmt::Write as _;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -69,7 +70,7 @@ pub struct RunArgs {
     /// The robot as it is (a model file).
     #[arg(long, value_name = "FILE")]
     plant_model: Option<PathBuf>,
-    /// Where trace.log, truth.csv and summary.json go.
+    /// Where trace.log, truth.csv and summary.json go; with --controller qemu controller.log, too.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Print summary.json instead of the text.
@@ -158,9 +159,14 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
                 },
                 count: None,
             };
-            run::execute_with(&config, Some(&args.out), |config| {
-                Qemu::start(config, &options)
-            })
+            let mut controller = None;
+            let summary = run::execute_with(&config, Some(&args.out), |config| {
+                Ok(controller.insert(Qemu::start(config, &options)?))
+            });
+            if let Some(controller) = &mut controller {
+                keep_log(controller, &args.out.join("controller.log"));
+            }
+            summary
         }
         Place::LockStep(bus) => run::execute_with(&config, Some(&args.out), |config| {
             LockStep::connect(bus, config)
@@ -187,6 +193,19 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     match &summary.error {
         None => Ok(ExitCode::SUCCESS),
         Some(error) => Err(format!("the run was not completed: {error}")),
+    }
+}
+
+/// Writes what the controller has logged. A log that is lost takes nothing away from the run.
+fn keep_log(controller: &mut Qemu, path: &Path) {
+    let written = controller
+        .take_log()
+        .and_then(|log| fs::write(path, log).map_err(|error| error.to_string()));
+    if let Err(error) = written {
+        eprintln!(
+            "plant-sim: the controller's log is not in {}: {error}",
+            path.display()
+        );
     }
 }
 

@@ -4,7 +4,7 @@
 //! reads the end of it, or, on its UART, when nothing has come for 20 s. A thread watches over a child that does not get
 //! that far.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
@@ -58,6 +58,8 @@ pub struct Board {
     replies: BufReader<ChildStdout>,
     /// What the frames travel on, unless it is the FIFOs.
     serial: Option<Serial<UnixStream>>,
+    /// What has been logged, as it came.
+    log: File,
     watch: Arc<Watch>,
     watcher: Option<JoinHandle<Ended>>,
 }
@@ -88,6 +90,10 @@ impl Board {
             .to_bytes()
             .ok_or_else(|| failure("cannot be configured: the record is too short"))?;
         let place = Place::new()?;
+        let path = place.0.join(LOG);
+        let log = File::create_new(&path)
+            .and_then(|_| File::open(&path))
+            .map_err(|error| unusable(&path, &error))?;
 
         let mut command = Command::new(EMULATOR);
         command
@@ -140,6 +146,7 @@ impl Board {
             requests,
             replies: BufReader::new(replies),
             serial: None,
+            log,
             watch,
             watcher: Some(watcher),
         };
@@ -271,6 +278,14 @@ impl Board {
             Some(Ended::ByItself(Err(error), _)) => failure(format!("was lost: {error}")),
             None => failure(format!("does not answer: {error}")),
         }
+    }
+
+    /// Ends the emulation; returns what the board has logged, as it came.
+    pub fn take_log(&mut self) -> io::Result<Vec<u8>> {
+        self.close();
+        let mut log = Vec::new();
+        self.log.read_to_end(&mut log)?;
+        Ok(log)
     }
 
     /// Closes the channel and waits for the end.
