@@ -36,10 +36,17 @@ impl Trig {
     /// Error in units of u = 2^-24: 2.5 for the single angles ([`sin_cos`]); 9.1 for the sum, which is 2.5 times the sum of
     /// the four magnitudes (at most 2 sqrt 2) and 2 for rounding products and sum. The addition theorem costs a fifth of
     /// another `sin_cos`, and is no worse than rounding theta1 + theta2 would be.
-    // In line, so that a caller pays for those functions only that it looks at: dynamics never ask for theta1.
-    #[inline(always)]
+    #[inline(never)]
     #[must_use]
     pub fn new(q: &Vector4<f32>) -> Self {
+        Self::in_line(q)
+    }
+
+    /// As [`Trig::new`], in line, where time is short: what the caller does not look at is not evaluated. Dynamics never ask
+    /// for theta1.
+    #[inline(always)]
+    #[must_use]
+    pub fn in_line(q: &Vector4<f32>) -> Self {
         let (s1, c1) = sin_cos(q.x);
         let (s2, c2) = sin_cos(q.y);
         let (s4, c4) = sin_cos(q.w);

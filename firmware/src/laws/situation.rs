@@ -81,7 +81,7 @@ pub struct Task {
 impl Task {
     /// Task space of an arm of this geometry whose measured position is that of `trig`.
     pub fn new(geometry: &Geometry, trig: &Trig, motion: &Motion<'_>) -> Self {
-        let desired = Jacobian::new(geometry, &Trig::new(&motion.reference.q));
+        let desired = Jacobian::new(geometry, &Trig::in_line(&motion.reference.q));
         let actual = Jacobian::new(geometry, trig);
         let ((x_desired, y_desired), (x, y)) = (desired.position(), actual.position());
         // Height and yaw are linear in the joints: so are their errors.

@@ -29,7 +29,7 @@ impl Capacity<'_> {
     /// reaches its share; huge where the sample needs hardly any.
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
         let Self { arm, body } = self;
-        let trig = Trig::new(&here.q);
+        let trig = Trig::in_line(&here.q);
         let qd = here.dq * along.v;
         let push = body.inertial(&trig, &(here.dq * along.a));
         let rest = body.inertial(&trig, &(here.ddq * (along.v * along.v)))
@@ -85,7 +85,7 @@ impl Capacity<'_> {
     /// motors, of an arm that [can creep](Self::check_creep).
     pub fn torque_scale(&self, reference: &Reference) -> f32 {
         let Self { arm, body } = self;
-        let trig = Trig::new(&reference.q);
+        let trig = Trig::in_line(&reference.q);
         let (qd, qdd) = (&reference.qd, &reference.qdd);
         // tau(x) = a x² + b x + c. Coulomb friction does not fade with x.
         let a = body.inertial(&trig, qdd) + body.lagrange.bias(&trig, qd);
