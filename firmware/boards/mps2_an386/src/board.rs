@@ -111,7 +111,7 @@ fn serve(
         reply.clear();
         let measured = match Request::from_bytes(&record).ok_or(End)? {
             Request::Poll { now, frame } => {
-                let measured = poll(node, now, frame, reply);
+                let measured = poll::<crate::Image>(node, now, frame, reply);
                 settle(node, now, pins, journal);
                 measured
             }
@@ -127,10 +127,15 @@ fn serve(
 }
 
 /// Calls the node; returns the timer ticks it took, up to 2^24.
-fn poll(node: &mut Node, now: u64, received: Option<CanFrame>, reply: &mut Reply) -> Measured {
+fn poll<I: Image>(
+    node: &mut Node,
+    now: u64,
+    received: Option<CanFrame>,
+    reply: &mut Reply,
+) -> Measured {
     let mut port = Port { received, reply };
     let before = SYST::get_current();
-    let mut meter = <crate::Image as Image>::Meter::default();
+    let mut meter = I::Meter::default();
     node.poll_with(now, &mut port, &mut meter);
     Measured {
         number: ticks_since(before),
