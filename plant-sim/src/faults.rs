@@ -89,6 +89,8 @@ pub struct Seen {
     pub braked: bool,
     /// Speed of the lift in the end, m/s. The other axes have no brake: they coast.
     pub lift: f64,
+    /// The log, of before and after.
+    pub log: String,
 }
 
 impl Seen {
@@ -125,6 +127,10 @@ impl Seen {
             ),
             (!self.braked, "brake open"),
             (self.lift.abs() > STANDING, "lift moving"),
+            (
+                !self.log.contains(&format!("started: {reason:?}")),
+                "another reason in the log",
+            ),
         ]
         .into_iter()
         .filter(|(wrong, _)| *wrong)
@@ -173,6 +179,7 @@ pub fn plant(config: &RunConfig, image: &Path, planted: Planted) -> Result<Seen,
             .map_err(|error| text(&error))?;
     }
     watch.seen.stop = rig.controller().last_stop();
+    watch.seen.log = rig.controller().take_log()?;
     Ok(watch.seen)
 }
 
@@ -247,6 +254,7 @@ mod tests {
             let_go: Some(LET_GO),
             braked: true,
             lift: 0.0,
+            log: "0.342 INFO started: HardFault".into(),
         }
     }
 
@@ -261,7 +269,7 @@ mod tests {
             change(&mut stop);
             Some(stop)
         };
-        let cases: [(&str, Seen); 10] = [
+        let cases: [(&str, Seen); 11] = [
             (
                 "pins",
                 Seen {
@@ -329,6 +337,13 @@ mod tests {
                 "lift",
                 Seen {
                     lift: -0.1,
+                    ..good()
+                },
+            ),
+            (
+                "log",
+                Seen {
+                    log: "0.000 INFO started: PowerOn".into(),
                     ..good()
                 },
             ),
