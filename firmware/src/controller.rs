@@ -7,13 +7,15 @@
 //! There is one call and it is total: every input gives an output, the work is bounded, nothing
 //! is allocated and no clock is read. Time is the number of samples.
 
+mod modes;
+mod motion;
 mod requests;
 
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
     Cause, Compensation, ControlWord, DriveStatus, Law, Mode, MotionReply, MotionRequest, Outcome,
-    Refusal, RefusalReason,
+    Refusal,
 };
 use serde::{Deserialize, Serialize};
 
@@ -27,8 +29,7 @@ use crate::mode::{self, Event};
 use crate::monitor::{Finding, Monitor, MonitorLimits};
 use crate::phase::{Phase, Probe};
 use crate::trajectory::Reference;
-use crate::trajectory::capacity::Capacity;
-use crate::trajectory::queue::{CAPACITY, MoveQueue, Progress};
+use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use requests::Answer;
 
 /// Samples that a gap in the feedback may span before the arm is stopped.
@@ -363,165 +364,6 @@ impl Controller {
         // The outbox holds an answer to everything that can wait to be planned, and as many again.
         if self.replies.push_back(reply).is_err() {
             self.unanswered = self.unanswered.saturating_add(1);
-        }
-    }
-
-    // --- modes ----------------------------------------------------------------------------
-
-    fn enter(&mut self, next: Mode, was_powered: bool) {
-        let brake = self.brake_samples();
-        match next {
-            Mode::Enabling => {
-                self.opening = brake;
-                self.memory = Memory::new();
-                self.monitor.reset();
-            }
-            Mode::Disabling => self.shutdown = Shutdown::Closing(brake),
-            Mode::FaultReaction | Mode::EStop => {
-                self.withdraw();
-                self.shutdown = match self.shutdown {
-                    Shutdown::Off if was_powered => Shutdown::Stopping,
-                    already => already,
-                };
-            }
-            Mode::Fault => {
-                self.withdraw();
-                self.queue.clear(&self.reference.q);
-                self.shutdown = Shutdown::Off;
-            }
-            Mode::PreOperational => self.cause = Cause::None,
-            _ => {}
-        }
-        self.mode = next;
-    }
-
-    fn fail(&mut self, finding: Finding) {
-        if mode::transition(self.mode, Event::Fail).is_some() {
-            self.alarm = Some(finding);
-            self.event(Event::Fail, finding.cause);
-        }
-    }
-
-    fn watch(&mut self, status: DriveStatus, q: &Vector4<f32>, qd: &Vector4<f32>) {
-        if !mode::is_powered(self.mode) {
-            return;
-        }
-        let error = self.reference.q - q;
-        // The reference of the last sample: at most one sample of motion older than `q`.
-        let moved = self.reference.qd * self.config.period;
-        if let Some(finding) = self.monitor.check(status, q, qd, &(error + moved)) {
-            self.fail(finding);
-        }
-    }
-
-    /// Whether torque holds or moves the arm.
-    fn is_holding(&self) -> bool {
-        mode::is_powered(self.mode) || self.shutdown != Shutdown::Off
-    }
-
-    fn brake_samples(&self) -> u32 {
-        (self.config.brake_delay / self.config.period) as u32 + 1
-    }
-
-    fn count_brake(&mut self, steps: u32) {
-        if self.mode == Mode::Enabling {
-            self.opening = self.opening.saturating_sub(steps);
-            if self.opening == 0 {
-                self.event(Event::BrakeOpen, Cause::None);
-            }
-        }
-        if let Shutdown::Closing(left) = self.shutdown {
-            let left = left.saturating_sub(steps);
-            self.shutdown = Shutdown::Closing(left);
-            if left == 0 {
-                self.shutdown = Shutdown::Off;
-                self.event(Event::BrakeClosed, Cause::None);
-            }
-        }
-    }
-
-    /// What drives and pins are to do now: unlike the command sent last, it also follows what
-    /// happens between two samples.
-    pub fn control_word(&self) -> ControlWord {
-        let holding = self.is_holding();
-        let closing = matches!(self.shutdown, Shutdown::Closing(_));
-        ControlWord::EMPTY
-            .with(ControlWord::TORQUE_ENABLE, holding)
-            .with(ControlWord::BRAKE_RELEASE, holding && !closing)
-            .with(ControlWord::QUICK_STOP, self.is_stopping())
-            .with(ControlWord::ESTOP, self.mode == Mode::EStop)
-    }
-
-    // --- motion ---------------------------------------------------------------------------
-
-    fn is_stopping(&self) -> bool {
-        self.mode == Mode::QuickStop || self.shutdown == Shutdown::Stopping
-    }
-
-    /// Refuses what waits to be planned; planned moves go when the arm has come to rest.
-    fn withdraw(&mut self) {
-        while let Some(sequence) = self.queue.withdraw() {
-            self.reply(
-                sequence,
-                Outcome::Refused(Refusal::because(RefusalReason::Stopped)),
-            );
-        }
-    }
-
-    /// Plans on, for the time until the next sample: a step for every millisecond of the sampling
-    /// period, at least one. Off the way from measurement to command, which it would only make
-    /// late. Returns whether there was anything to plan.
-    pub fn plan(&mut self) -> bool {
-        if !self.is_holding() || !self.queue.has_to_plan() {
-            return false;
-        }
-        let capacity = Capacity {
-            arm: &self.config.arm,
-            body: &self.body,
-        };
-        for _ in 0..self.planning_steps {
-            match self.queue.plan(&capacity) {
-                None => {}
-                Some((sequence, answer)) => {
-                    let outcome = answer.map_or_else(Outcome::Refused, |()| Outcome::Accepted);
-                    self.reply(sequence, outcome);
-                    break;
-                }
-            }
-        }
-        true
-    }
-
-    /// The reference at this sample.
-    fn advance(&mut self, steps: u32) -> Reference {
-        if self.mode == Mode::Enabled {
-            if !self.queue.is_ready() {
-                return Reference::rest(self.reference.q);
-            }
-            self.event(Event::Start, Cause::None);
-        }
-        let stopping = self.is_stopping();
-        let (reference, progress) = self.queue.advance(
-            &self.config.arm,
-            steps,
-            self.config.period,
-            stopping,
-            &self.reference.q,
-        );
-        match progress {
-            Progress::UnderWay => {}
-            Progress::Arrived if stopping => self.come_to_rest(&reference.q),
-            Progress::Arrived => self.event(Event::Arrived, Cause::None),
-        }
-        reference
-    }
-
-    fn come_to_rest(&mut self, q: &Vector4<f32>) {
-        self.queue.clear(q);
-        if self.mode == Mode::QuickStop {
-            self.event(Event::AtRest, Cause::None);
-        } else {
-            self.shutdown = Shutdown::Closing(self.brake_samples());
         }
     }
 }

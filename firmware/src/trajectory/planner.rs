@@ -17,6 +17,8 @@
 //! scale at which the worst sample touches its limit (Hollerbach, *Dynamic scaling of manipulator
 //! trajectories*, 1984).
 
+mod verify;
+
 use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
@@ -26,6 +28,7 @@ use super::profile::{Bounds, SCurve, Sample};
 use super::request::{Gate, Request, Target, from_ik, from_path};
 use super::{Lift, Trajectory};
 use crate::arm::ArmModel;
+use verify::LINE_STEPS;
 
 /// Points of the survey of a line.
 const SURVEY_POINTS: u8 = 24;
@@ -33,12 +36,6 @@ const SURVEY_POINTS: u8 = 24;
 const ROUNDS: u8 = 3;
 /// Samples of each half of the profile in one round.
 const BALANCE_POINTS: u8 = 3;
-/// Steps of the last pass, at the most, between the borders of segments; along a line more, since there the joints have
-/// extremes of their own.
-const JOINT_STEPS: u8 = 20;
-const LINE_STEPS: u8 = 40;
-/// Share of the limits of speed, acceleration and jerk that the samples of a line may use.
-const LINE_SHARE: f32 = 0.9;
 /// A correction of an acceleration by more than this factor waits for the next round.
 const STEP: f32 = 1.6;
 /// Moves whose every axis travels less than this (rad or m) end where they begin.
@@ -321,79 +318,6 @@ impl Planner {
         self.bounds.brake = correct(down, braking_gain);
         self.stage = Stage::Compose { round: round + 1 };
         Ok(())
-    }
-
-    /// One sample of the whole move.
-    fn verify(
-        &mut self,
-        capacity: &Capacity<'_>,
-        t: f32,
-        rate: f32,
-        before: Option<(f32, Vector4<f32>)>,
-    ) -> Result<(), Refusal> {
-        let mut reference = self.draft.at(capacity.arm, t).map_err(from_path)?;
-        let mut rate = rate.min(capacity.torque_scale(&reference));
-        if matches!(self.draft.path, Path::Line { .. }) {
-            // The joint accelerations bend between the samples, and the jerk has a part that only
-            // their difference shows.
-            if let Some((earlier, qdd)) = before {
-                reference.qddd = (reference.qdd - qdd) / (t - earlier);
-            }
-            rate = rate.min(capacity.rate_scale(&reference, LINE_SHARE));
-        } else {
-            // Each joint keeps its own limits by how its profile was made. Lift and wrist share a
-            // motor.
-            rate = rate.min(capacity.lift_motor_scale(&reference.qd));
-        }
-        self.draft.braking = self.draft.braking.sup(&reference.qdd.abs());
-        self.stage = if t < self.draft.span {
-            Stage::Verify {
-                t: self.next_sample(t),
-                rate,
-                before: Some((t, reference.qdd)),
-            }
-        } else {
-            Stage::Finish { rate }
-        };
-        Ok(())
-    }
-
-    /// Makes the trajectory of the draft.
-    fn finish(&mut self, capacity: &Capacity<'_>, rate: f32) -> Result<(), Refusal> {
-        // Past the end, so that rounding of the last sample cannot leave the arm short of it.
-        let past = self.draft.span + 1.0;
-        self.draft.end = self.draft.at(capacity.arm, past).map_err(from_path)?.q;
-        self.draft.braking *= rate * rate;
-        self.draft.rate = rate * self.speed;
-        self.stage = Stage::Idle;
-        Ok(())
-    }
-
-    /// Where the last pass looks after `t`, s: inertia changes along the way, and at the border of a segment torque is
-    /// often greatest.
-    fn next_sample(&self, t: f32) -> f32 {
-        let Trajectory {
-            path,
-            start,
-            profile,
-            lift,
-            span,
-            ..
-        } = &self.draft;
-        let steps = match path {
-            Path::Joint { .. } => JOINT_STEPS,
-            Path::Line { .. } => LINE_STEPS,
-        };
-        let step = span / f32::from(steps);
-        // A border next to the last sample is no news, and rounding must not keep the walk from going on.
-        let soon = t + 0.05 * step;
-        let mut next = (t + step).min(*span);
-        next = next.min(start + profile.border_after(soon - start));
-        if let Some(lift) = lift {
-            next = next.min(lift.up.border_after(soon));
-            next = next.min(lift.down_start + lift.down.border_after(soon - lift.down_start));
-        }
-        next
     }
 
     fn point(&self, arm: &ArmModel, s: f32) -> Result<PathPoint, Refusal> {
