@@ -61,6 +61,8 @@ pub struct Node {
     bad_feedback: u8,
     /// Sample number and arrival of the newest feedback.
     newest: Option<(u32, u64)>,
+    /// Samples answered.
+    samples: u32,
     /// The drives were built from the same message table.
     same_schema: bool,
     overruns: u16,
@@ -87,6 +89,7 @@ impl Node {
             unsent: 0,
             bad_feedback: 0,
             newest: None,
+            samples: 0,
             same_schema: false,
             overruns: 0,
             worst_tick: 0,
@@ -243,9 +246,10 @@ impl Node {
         self.sequence.command = counter.wrapping_add(1);
         self.send(&Message::Command(command), counter, bus);
         probe.end(Phase::Encode);
-        // Now that the command is on its way. By the number of the sample and not by the time, so
-        // that the same feedback gives the same torques whenever it comes.
-        let planned = !feedback.sample.is_multiple_of(REPORT_SAMPLES) && self.controller.plan();
+        // Now that the command is on its way. By the count of samples and not by the time, so that
+        // the same feedback gives the same torques whenever it comes.
+        self.samples = self.samples.wrapping_add(1);
+        let planned = !self.samples.is_multiple_of(REPORT_SAMPLES) && self.controller.plan();
         probe.end(Phase::Planning);
         planned
     }

@@ -617,7 +617,7 @@ fn planning_and_reports_take_turns() {
     let mut silent = 0;
     for _ in 0..300 {
         let planning = bench.node.controller().is_planning();
-        let rests = bench.sample.is_multiple_of(10);
+        let rests = (bench.sample + 1).is_multiple_of(10);
         let sent = bench.step();
         let reports = sent
             .iter()

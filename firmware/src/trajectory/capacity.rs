@@ -221,6 +221,7 @@ fn scale_within(a: f32, b: f32, c: f32, limit: f32) -> f32 {
 }
 
 /// The positive root of `a x² + b x = room`, for a + b > room >= 0.
+#[cold]
 fn largest_scale(a: f32, b: f32, room: f32) -> f32 {
     // In the form that does not cancel. For a < 0, b > room - a makes the discriminant positive.
     let root = sqrt((b * b + 4.0 * a * room).max(0.0));
