@@ -4,7 +4,14 @@
 
 image=$(built stm32g474)
 arm-none-eabi-size "$image"
-tests/board/symbols "$image" --driver-panics
+tests/board/symbols "$image" --no-panic-in '(firmware|protocol)/src/'
+echo "- a panic in line is found: the one that is planted in another image"
+faults=$(built mps2-an386 --bin mps2-an386-faults)
+if tests/board/symbols "$faults" --no-panic-in 'firmware/boards/mps2_an386/src/' >/dev/null 2>"$scratch/panics"; then
+    echo "32-stm32: a planted panic was not found" >&2
+    exit 1
+fi
+grep -q 'boards/mps2_an386/src/faults.rs' "$scratch/panics"
 echo "- the vector table leads to the handlers of the board"
 # Not through a pipe: grep stops reading at the first match, and nm would die of that.
 names=$(arm-none-eabi-nm "$image")

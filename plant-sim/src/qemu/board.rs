@@ -233,7 +233,7 @@ impl Board {
         match self.wait(|board| listen(&mut board.replies, sent))? {
             Said::Reply(measured) => Ok(measured),
             Said::Greeting(stop) => Err(failure(format!(
-                "has started again by itself: {} at {:#010x}, fault status {:#010x}; arm-none-eabi-addr2line -fe IMAGE \
+                "has started again by itself: {} at {:#010x}, fault status {:#010x}; arm-none-eabi-addr2line -ife IMAGE \
                  ADDRESS names the place",
                 stop.reason, stop.at, stop.status
             ))),
