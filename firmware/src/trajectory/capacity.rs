@@ -52,7 +52,7 @@ impl Capacity<'_> {
         room
     }
 
-    /// Whether the arm can creep: hold its weight against friction in either direction.
+    /// Whether the arm can creep: carry its weight against friction in either direction, with torque to spare.
     ///
     /// # Errors
     /// [`RefusalReason::TorqueTooSmall`] with the axis and torque that no time scale makes less.
@@ -68,14 +68,14 @@ impl Capacity<'_> {
             })
         };
         for ((axis, value), limit) in Axis::ALL.into_iter().zip(torque.iter()).zip(joint.iter()) {
-            if value > limit {
+            if value >= limit {
                 return refuse(axis, *value, *limit);
             }
         }
         let lift = Vector4::new(0.0, 0.0, torque.z, 0.0);
         let wrist = Vector4::new(0.0, 0.0, 0.0, torque.w);
         let value = self.wrist_motor(&lift).abs() + self.wrist_motor(&wrist).abs();
-        if value > motor {
+        if value >= motor {
             return refuse(Axis::Wrist, value, motor);
         }
         Ok(())
@@ -109,7 +109,8 @@ impl Capacity<'_> {
     /// the wrist, which carries part of the lift's force, too.
     fn torque_limits(&self) -> (Vector4<f32>, f32) {
         let motor = self.arm.drive.motor_torque_limit * TORQUE_SHARE;
-        let own = self.body.drive.own_torque(&motor).abs();
+        let mut own = self.body.drive.own_torque(&motor).abs();
+        own.w = f32::MAX;
         (self.torque().inf(&own), motor.w)
     }
 
@@ -167,7 +168,7 @@ impl Capacity<'_> {
         let peak = sqrt(cap * height).min(speed);
         let friction = self.arm.drive.coulomb.z + self.arm.drive.viscous.z * peak;
         let force = self.torque().z;
-        // A stroke that the drive cannot hold is refused by the last pass: keep this positive.
+        // A stroke that the drive cannot hold has been refused: this keeps one that it hardly can positive.
         let within = |force: f32| clamp(force / mass, 0.01 * cap, cap);
         let up = Bounds {
             speed,
@@ -220,7 +221,7 @@ fn scale_within(a: f32, b: f32, c: f32, limit: f32) -> f32 {
     }
 }
 
-/// The positive root of `a x² + b x = room`, for a + b > room >= 0.
+/// The positive root of `a x² + b x = room`, for a + b > room > 0.
 #[cold]
 fn largest_scale(a: f32, b: f32, room: f32) -> f32 {
     // In the form that does not cancel. For a < 0, b > room - a makes the discriminant positive.
