@@ -15,6 +15,7 @@ use firmware::node::Node;
 use firmware::phase::Phase;
 use firmware::reset::Stop;
 use firmware::sample_clock::SampleClock;
+pub use image::build;
 pub use mps2_an386::Channel;
 use mps2_an386::{Fault, Measured, Request, Setup};
 use protocol::frame::CanFrame;
@@ -62,14 +63,6 @@ pub const IMAGE: &str = "mps2-an386";
 pub const FAULTS_IMAGE: &str = "mps2-an386-faults";
 /// The image that measures the phases of a call.
 pub const COST_IMAGE: &str = "mps2-an386-cost";
-
-/// Builds an image from the sources; returns where it is.
-///
-/// # Errors
-/// It cannot be built; with what to do about it.
-pub fn build(program: &str) -> Result<PathBuf, EndpointError> {
-    image::build(program)
-}
 
 /// The controller in QEMU with its twin in this process.
 #[derive(Debug)]

@@ -9,6 +9,7 @@ use nalgebra::Vector4;
 use protocol::messages::Compensation;
 
 use super::{Gains, Memory, Situation, computed_torque};
+
 /// Joint torques.
 pub fn torque(
     situation: &Situation<'_>,

@@ -218,8 +218,8 @@ impl Endpoint for LockStep {
     }
 }
 
-/// The same controller in this process, started by network management. The time that a command takes is what a controller on a real bus assumes, not
-/// what the rig knows.
+/// The same controller in this process, started by network management. The time that a command
+/// takes is what a controller on a real bus assumes, not what the rig knows.
 pub(crate) fn twin(config: &Config) -> Node {
     Node::new(
         Config::new(config.arm, config.period),

@@ -8,7 +8,10 @@ use crate::endpoint::EndpointError;
 
 const PACKAGE: &str = "mps2-an386";
 
-/// Builds an image of the board; returns where it is.
+/// Builds an image of the board from the sources; returns where it is.
+///
+/// # Errors
+/// It cannot be built; with what to do about it.
 pub fn build(program: &str) -> Result<PathBuf, EndpointError> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/board/cargo");
     if !script.exists() {
