@@ -25,24 +25,8 @@
     )
 )]
 
-pub mod arm;
-pub mod body;
 pub mod cabinet;
-pub mod controller;
-pub mod dynamics;
-pub mod jacobian;
-#[cfg(feature = "defmt")]
-pub mod journal;
-pub mod kinematics;
-pub mod laws;
-pub mod limits;
-pub mod math;
-pub mod mode;
-pub mod monitor;
+pub mod control;
+pub mod mechanics;
 pub mod node;
-pub mod phase;
-pub mod reset;
-pub mod sample_clock;
-mod self_test;
 pub mod trajectory;
-pub mod velocity;

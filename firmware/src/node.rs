@@ -15,12 +15,12 @@ use protocol::messages::{
     ResetReason, Server, State,
 };
 use protocol::messages::{Mode, Node as Name};
-use protocol::schema::SCHEMA_HASH;
+use protocol::table;
 
-use crate::controller::{Config, Controller, Readings};
-use crate::mode::Event;
-use crate::phase::{Phase, Probe};
-use crate::self_test;
+use crate::control::controller::{Config, Controller, Readings};
+use crate::control::mode::Event;
+use crate::control::phase::{Phase, Probe};
+use crate::control::self_test;
 
 /// Frames taken from the bus in one call; more wait for the next.
 pub const FRAMES_PER_POLL: usize = 8;
@@ -276,9 +276,9 @@ impl Node {
     fn parameter<B: Bus>(&mut self, request: &ParameterRequest, bus: &mut B) {
         let reply = match request {
             ParameterRequest::Hello(peer) => {
-                self.same_schema = peer.schema == SCHEMA_HASH;
+                self.same_schema = peer.schema == table::HASH;
                 ParameterReply::Hello(Hello {
-                    schema: SCHEMA_HASH,
+                    schema: table::HASH,
                     build: BUILD,
                     profile: Hello::PROFILE_FD,
                 })
@@ -308,7 +308,7 @@ impl Node {
 
     fn reject(&mut self, error: DecodeError, frame: &protocol::frame::CanFrame) {
         self.received.refuse(&error);
-        if !frame.is_extended() && frame.raw_id() == u32::from(protocol::table::FEEDBACK.id) {
+        if table::FEEDBACK.identifies(frame) {
             self.suspect(match error {
                 DecodeError::Crc => Cause::Corrupted,
                 _ => Cause::BadValue,

@@ -4,7 +4,7 @@ use core::convert::Infallible;
 use std::cell::Cell;
 
 use embedded_hal::digital::{Error, ErrorKind, ErrorType, InputPin, OutputPin};
-use firmware::cabinet::{Cabinet, PinFault};
+use firmware::cabinet::pins::{Cabinet, PinFault};
 use protocol::messages::{ControlWord, Mode};
 
 struct Pin<'a>(&'a Cell<bool>);

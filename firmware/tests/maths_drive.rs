@@ -3,8 +3,8 @@
 mod common;
 
 use common::{U, acceleration, assert_close, position, speed, within};
-use firmware::arm::{DriveTrain, IRB_930};
-use firmware::dynamics::drive::Drive;
+use firmware::mechanics::arm::{DriveTrain, IRB_930};
+use firmware::mechanics::dynamics::drive::Drive;
 use nalgebra::{Matrix4, Vector4};
 use proptest::prelude::*;
 

@@ -6,11 +6,11 @@ mod common;
 
 use common::magnitude::{self, LAGRANGE, NEWTON_EULER};
 use common::{U, acceleration, arm, assert_close, payload, position, speed};
-use firmware::arm::{ArmModel, Payload};
-use firmware::body::Body;
-use firmware::dynamics::lagrange::Lagrange;
-use firmware::dynamics::newton_euler;
-use firmware::kinematics::Trig;
+use firmware::mechanics::arm::{ArmModel, Payload};
+use firmware::mechanics::body::Body;
+use firmware::mechanics::dynamics::lagrange::Lagrange;
+use firmware::mechanics::dynamics::newton_euler;
+use firmware::mechanics::kinematics::Trig;
 use nalgebra::{Matrix4, Vector4};
 use proptest::prelude::*;
 
@@ -185,7 +185,7 @@ proptest! {
 /// The lift alone: a falling mass.
 #[test]
 fn released_lift_falls_at_g() {
-    let lagrange = Lagrange::new(&firmware::arm::IRB_930, &Payload::NONE);
+    let lagrange = Lagrange::new(&firmware::mechanics::arm::IRB_930, &Payload::NONE);
     let rest = Vector4::zeros();
     let qdd = lagrange.forward(&Trig::new(&rest), &rest, &rest);
     assert!((f64::from(qdd.z) - 9.81).abs() <= 4.0 * U * 9.81, "{qdd}");

@@ -5,7 +5,7 @@ mod common;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use common::U;
-use firmware::math::{atan2, cbrt, clamp, hypot, sin_cos, sqrt, tanh, wrap};
+use firmware::mechanics::math::{atan2, cbrt, clamp, hypot, sin_cos, sqrt, tanh, wrap};
 use proptest::prelude::*;
 
 /// `count` points evenly over [-range, range], each with its neighbours in f32.

@@ -3,9 +3,9 @@
 mod common;
 
 use common::{U, arm, assert_close, position, speed, within};
-use firmware::arm::{ArmModel, IRB_930};
-use firmware::jacobian::{DAMPING_ONSET, Jacobian, SINGULAR_SINE};
-use firmware::kinematics::Trig;
+use firmware::mechanics::arm::{ArmModel, IRB_930};
+use firmware::mechanics::jacobian::{DAMPING_ONSET, Jacobian, SINGULAR_SINE};
+use firmware::mechanics::kinematics::Trig;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use proptest::prelude::*;
 

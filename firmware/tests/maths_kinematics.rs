@@ -5,13 +5,13 @@ mod common;
 use std::f64::consts::TAU;
 
 use common::{U, assert_close, irb_930_short, position, speed};
-use firmware::arm::{ArmModel, Axis, IRB_930};
-use firmware::jacobian::Jacobian;
-use firmware::kinematics::{
+use firmware::mechanics::arm::{ArmModel, Axis, IRB_930};
+use firmware::mechanics::jacobian::Jacobian;
+use firmware::mechanics::kinematics::{
     Elbow, IkError, LIMIT_TOLERANCE, Pose, REACH_TOLERANCE, Trig, forward, inverse, link_frames,
     rotation, solve,
 };
-use firmware::velocity::propagate;
+use firmware::mechanics::velocity::propagate;
 use nalgebra::{Matrix3, Vector3, Vector4};
 use proptest::prelude::*;
 

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{arm, irb_930_short, payload};
-use firmware::arm::{ArmModel, Axis, IRB_930, ModelError, Payload, Rule};
+use firmware::mechanics::arm::{ArmModel, Axis, IRB_930, ModelError, Payload, Rule};
 use proptest::prelude::*;
 
 fn refused(change: impl FnOnce(&mut ArmModel)) -> ModelError {

@@ -1,10 +1,10 @@
 //! Planned motion against the limits of the robot, judged by the recursive Newton-Euler dynamics that
 //! planner does not use.
 
-use firmware::arm::{ArmModel, IRB_930, Payload};
-use firmware::body::Body;
-use firmware::dynamics::newton_euler;
-use firmware::kinematics::{self, Pose};
+use firmware::mechanics::arm::{ArmModel, IRB_930, Payload};
+use firmware::mechanics::body::Body;
+use firmware::mechanics::dynamics::newton_euler;
+use firmware::mechanics::kinematics::{self, Pose};
 use firmware::trajectory::Trajectory;
 use firmware::trajectory::capacity::Capacity;
 use firmware::trajectory::planner::Planner;

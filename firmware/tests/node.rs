@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
-use firmware::arm::IRB_930;
-use firmware::controller::{Config, MAX_GAP};
-use firmware::dynamics::drive::Drive;
+use firmware::control::controller::{Config, MAX_GAP};
+use firmware::control::phase::{Phase, Probe};
+use firmware::mechanics::arm::IRB_930;
+use firmware::mechanics::dynamics::drive::Drive;
 use firmware::node::{FRAMES_PER_POLL, Node, PEER_TIMEOUT_US};
-use firmware::phase::{Phase, Probe};
 use nalgebra::Vector4;
 use proptest::prelude::*;
 use protocol::bus::{Bus, TransmitError};
@@ -17,7 +17,7 @@ use protocol::messages::{
     Motion, MotionRequest, Nmt, NmtCommand, Node as Name, Outcome, ParameterRequest, RefusalReason,
     ResetReason, Server, State,
 };
-use protocol::schema::SCHEMA_HASH;
+use protocol::table;
 
 const PERIOD_US: u64 = 1000;
 
@@ -69,7 +69,7 @@ impl Bench {
     /// A bench whose axes are under torque.
     fn enabled() -> Self {
         let mut bench = Self::new();
-        bench.hello(SCHEMA_HASH);
+        bench.hello(table::HASH);
         bench.run(2);
         assert_eq!(bench.request(MotionRequest::Stop), Some(Outcome::Accepted));
         assert_eq!(
@@ -192,7 +192,7 @@ fn switching_on_takes_a_known_peer_and_opens_the_brake_under_torque() {
     let mut bench = Bench::new();
     assert!(is_off(&bench.command()));
     assert_eq!(bench.mode(), Mode::PreOperational);
-    bench.hello(SCHEMA_HASH);
+    bench.hello(table::HASH);
     bench.run(2);
     assert_eq!(bench.mode(), Mode::Ready);
     assert_eq!(bench.request(MotionRequest::Stop), Some(Outcome::Accepted));
@@ -257,7 +257,7 @@ fn enable_is_refused_without_a_peer_of_the_same_schema() {
         bench.refusal(MotionRequest::Enable),
         RefusalReason::SchemaMismatch
     );
-    bench.hello(SCHEMA_HASH ^ 1);
+    bench.hello(table::HASH ^ 1);
     assert_eq!(
         bench.refusal(MotionRequest::Enable),
         RefusalReason::SchemaMismatch
@@ -268,7 +268,7 @@ fn enable_is_refused_without_a_peer_of_the_same_schema() {
 #[test]
 fn the_first_request_of_an_operator_switches_nothing_on() {
     let mut bench = Bench::new();
-    bench.hello(SCHEMA_HASH);
+    bench.hello(table::HASH);
     bench.run(2);
     assert_eq!(
         bench.refusal(MotionRequest::Enable),
@@ -284,7 +284,7 @@ fn the_first_request_of_an_operator_switches_nothing_on() {
 #[test]
 fn a_replayed_enable_is_dropped() {
     let mut bench = Bench::new();
-    bench.hello(SCHEMA_HASH);
+    bench.hello(table::HASH);
     bench.run(2);
     bench.request(MotionRequest::Stop);
     let enable = bench.motion(MotionRequest::Enable);

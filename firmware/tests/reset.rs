@@ -1,6 +1,6 @@
 //! The record of the last stop, in memory that may hold anything.
 
-use firmware::reset::{Record, Stop};
+use firmware::cabinet::reset::{Record, Stop};
 use proptest::prelude::*;
 use protocol::messages::ResetReason;
 

@@ -3,29 +3,27 @@
 //! `cargo bench -p plant-sim` reports samples a second; at 1 kHz a thousand of them are real time.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use plant_sim::model::RobotModel;
-use plant_sim::run::{RunConfig, execute};
-use plant_sim::scenario::Scenario;
+use plant_sim::run::execute;
+use sim::run::in_process;
+use sim::scenario::Scenario;
+use sim::setup::RunConfig;
 
 fn lockstep(criterion: &mut Criterion) {
-    let mut scenario = Scenario::open("gate").expect("the gate is built in");
+    let mut scenario = Scenario::built_in("gate").expect("the gate is built in");
     scenario.cycles = 2;
-    let config = RunConfig {
-        scenario,
-        model: RobotModel::irb_930_22_105(),
-        plant_model: RobotModel::irb_930_22_105(),
-        seed: 1,
-    };
+    let config = RunConfig::new(scenario);
     let directory = std::env::temp_dir().join(format!("lockstep-bench-{}", std::process::id()));
     let samples = |sim_time_s: f64| (sim_time_s * config.scenario.rate_hz) as u64;
-    let sim = execute(&config, None).expect("the gate runs").sim_time_s;
+    let sim = in_process(&config, &mut ())
+        .expect("the gate runs")
+        .sim_time_s;
     let mut group = criterion.benchmark_group("lockstep, 1 kHz");
     group.throughput(Throughput::Elements(samples(sim)));
     group.bench_function("gate, nothing written", |bench| {
-        bench.iter(|| execute(&config, None).expect("the gate runs"));
+        bench.iter(|| in_process(&config, &mut ()).expect("the gate runs"));
     });
     group.bench_function("gate, trace and truth written", |bench| {
-        bench.iter(|| execute(&config, Some(&directory)).expect("the gate runs"));
+        bench.iter(|| execute(&config, &directory).expect("the gate runs"));
     });
     group.finish();
     let _ = std::fs::remove_dir_all(directory);

@@ -1,8 +1,8 @@
 //! The table of docs/motion.md: every control law on the gate, with the right and a wrong model.
 
-use plant_sim::model::RobotModel;
-use plant_sim::run::{RunConfig, execute};
-use plant_sim::scenario::Scenario;
+use sim::run::in_process;
+use sim::scenario::Scenario;
+use sim::setup::RunConfig;
 
 const LAWS: [&str; 10] = [
     "kinematic-joint",
@@ -32,16 +32,11 @@ fn main() {
 }
 
 fn row(name: &str, law: &str, rate: f64) {
-    let mut scenario = Scenario::open(name).expect("built in");
+    let mut scenario = Scenario::built_in(name).expect("built in");
     scenario.law = law.parse().expect("a law's name");
     scenario.rate_hz = rate;
-    let config = RunConfig {
-        scenario,
-        model: RobotModel::irb_930_22_105(),
-        plant_model: RobotModel::irb_930_22_105(),
-        seed: 1,
-    };
-    let summary = match execute(&config, None) {
+    let config = RunConfig::new(scenario);
+    let summary = match in_process(&config, &mut ()) {
         Ok(summary) => summary,
         Err(error) => return println!("| {law} | {name} | {rate} | {error} |"),
     };

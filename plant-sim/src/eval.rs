@@ -8,11 +8,11 @@ mod controller;
 mod plant;
 mod table;
 
-use crate::model::{Payload, RobotModel};
 use cell::Cell;
 use controller::Controller;
 use nalgebra::Vector4;
 use plant::PlantSide;
+use sim::model::{Payload, RobotModel};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use table::Layout;
 use thiserror::Error;
@@ -57,7 +57,7 @@ pub enum EvalError {
     Write(io::Error),
     /// The controller's arithmetic does not stand this model.
     #[error("the controller refuses the model: {0}")]
-    Model(firmware::arm::ModelError),
+    Model(firmware::mechanics::arm::ModelError),
     /// A column that the table does not have.
     #[error("line 1: unknown column {column:?}; allowed are {allowed}")]
     UnknownColumn {

@@ -1,23 +1,18 @@
-//! The robot that is not there: rigid-body plant, drives, bit-timed CAN bus, traces, and the rig that joins them with the controller.
+//! The bench as a program: runs with their results on disk, controllers in other processes and on an emulated board, and
+//! tools that look into traces.
 
 #![forbid(unsafe_code)]
 
-pub mod bus;
-mod convert;
-pub mod dbc;
-pub mod drives;
-pub mod endpoint;
+pub mod check;
+pub mod crash;
 pub mod eval;
 pub mod external;
-pub mod faults;
-pub mod metrics;
-pub mod model;
+pub mod input;
 pub mod monitor;
-pub mod operator;
-pub mod plant;
+pub mod output;
+pub mod play;
+pub mod plot;
 pub mod qemu;
-pub mod rig;
+pub mod record;
+pub mod replay;
 pub mod run;
-pub mod scenario;
-pub mod selection;
-pub mod trace;

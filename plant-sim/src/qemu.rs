@@ -10,18 +10,18 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use firmware::controller::Config;
+pub use channel::Channel;
+use channel::{Fault, Measured, Request, Setup};
+use firmware::cabinet::reset::Stop;
+use firmware::cabinet::sample_clock::SampleClock;
+use firmware::control::controller::Config;
+use firmware::control::phase::Phase;
 use firmware::node::Node;
-use firmware::phase::Phase;
-use firmware::reset::Stop;
-use firmware::sample_clock::SampleClock;
 pub use image::build;
-pub use mps2_an386::Channel;
-use mps2_an386::{Fault, Measured, Request, Setup};
 use protocol::frame::CanFrame;
 
-use crate::endpoint::{Endpoint, EndpointError, InProcess};
 use board::Board;
+use sim::endpoint::{Endpoint, EndpointError, InProcess};
 
 /// What the emulation is asked for.
 #[derive(Clone, Debug, Default)]

@@ -1,7 +1,7 @@
 //! What `eval` accepts, what it prints, and what it says when it refuses.
 
 use plant_sim::eval::{By, Table, eval};
-use plant_sim::model::RobotModel;
+use sim::model::RobotModel;
 
 fn run(table: Table, by: By, input: &str) -> Result<String, String> {
     let mut output = Vec::new();

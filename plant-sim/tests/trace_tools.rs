@@ -2,23 +2,25 @@
 
 use std::sync::LazyLock;
 
-use firmware::arm::IRB_930;
-use plant_sim::bus::{BitTiming, FrameBits};
-use plant_sim::model::RobotModel;
-use plant_sim::rig::RigConfig;
-use plant_sim::run::{RunConfig, Summary, execute};
-use plant_sim::scenario::Scenario;
-use plant_sim::trace::check::{Checker, Offence};
-use plant_sim::trace::decode::{Decoder, Format};
-use plant_sim::trace::plot::Plot;
-use plant_sim::trace::replay::{Difference, Replay};
-use plant_sim::trace::stats::{Gatherer, Statistics};
-use plant_sim::trace::{Entry, ErrorFrame, Interface, Reader, Record};
+use firmware::mechanics::arm::IRB_930;
+use plant_sim::check::{Checker, Offence};
+use plant_sim::plot::Plot;
+use plant_sim::replay::{Difference, Replay};
+use plant_sim::run::execute;
 use protocol::codec::{self, DecodeError};
 use protocol::e2e::Verdict;
 use protocol::frame::{CanFrame, StandardId};
 use protocol::messages::{Command, ControlWord, DriveStatus, Feedback, Message};
 use protocol::table;
+use protocol::wire::{BitTiming, FrameBits};
+use sim::model::RobotModel;
+use sim::rig::RigConfig;
+use sim::scenario::Scenario;
+use sim::setup::RunConfig;
+use sim::summary::Summary;
+use trace::decode::{Decoder, Format};
+use trace::stats::{Gatherer, Statistics};
+use trace::{Entry, ErrorFrame, Interface, Reader, Record};
 
 fn record(time_us: u64, frame: CanFrame) -> Record {
     Record {
@@ -388,17 +390,11 @@ fn load_is_the_time_of_the_frames() {
 
 /// One cycle of the gate motion, and what the rig said of it.
 static RUN: LazyLock<(Vec<Record>, Summary)> = LazyLock::new(|| {
-    let mut scenario = Scenario::open("gate").unwrap();
+    let mut scenario = Scenario::built_in("gate").unwrap();
     scenario.cycles = 1;
-    let model = RobotModel::irb_930_22_105();
-    let config = RunConfig {
-        scenario,
-        plant_model: model.clone(),
-        model,
-        seed: 1,
-    };
+    let config = RunConfig::new(scenario);
     let directory = std::env::temp_dir().join(format!("trace-tools-{}", std::process::id()));
-    let summary = execute(&config, Some(&directory)).unwrap();
+    let summary = execute(&config, &directory).unwrap().summary;
     let log = std::fs::read(directory.join("trace.log")).unwrap();
     std::fs::remove_dir_all(&directory).unwrap();
     let records = Reader::new(log.as_slice()).map(Result::unwrap).collect();
@@ -408,8 +404,8 @@ static RUN: LazyLock<(Vec<Record>, Summary)> = LazyLock::new(|| {
 fn replay(records: &[Record]) -> Result<u64, Difference> {
     let model = RobotModel::irb_930_22_105();
     let config = RigConfig {
-        believed: (&model).into(),
-        plant: model,
+        nominal: (&model).into(),
+        actual: model,
         rate_hz: 1000.0,
         start: [0.0; 4],
         timing: BitTiming::default(),

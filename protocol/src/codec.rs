@@ -13,7 +13,7 @@ use core::fmt;
 
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::frame::{CanFrame, FD_MAX, FrameKind, Id, StandardId};
+use crate::frame::{CanFrame, FD_MAX, FrameKind, StandardId};
 use crate::messages::{EStop, EStopReason, Message};
 use crate::packed::Packed;
 use crate::schema::{Content, Kind, MessageInfo};
@@ -139,10 +139,7 @@ pub fn encode_with<T>(
 // Out of line: within the loop of a caller, the compiler would prepare it even where no frame has come.
 #[inline(never)]
 pub fn decode(frame: &CanFrame) -> Result<Received, DecodeError> {
-    let Id::Standard(id) = frame.id() else {
-        return Err(DecodeError::UnknownId);
-    };
-    let info = MessageInfo::of(id.as_raw()).ok_or(DecodeError::UnknownId)?;
+    let info = table::of_frame(frame).ok_or(DecodeError::UnknownId)?;
     if frame.is_remote() || frame.is_fd() != info.is_fd() {
         return Err(DecodeError::WrongKind);
     }

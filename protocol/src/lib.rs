@@ -2,7 +2,7 @@
 //!
 //! A frame comes from a [`Bus`](bus::Bus) that never blocks; the [`codec`] makes a message of it or says what is wrong
 //! with it; a [`Receiver`](e2e::Receiver) judges its place in the sequence. The way back is [`codec::encode`]. What
-//! identifiers and bytes mean stands in one [`table`]. Feature `std` adds the links of a Linux host.
+//! identifiers and bytes mean stands in one [`table`].
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -16,20 +16,17 @@
     )
 )]
 
-#[cfg(feature = "std")]
-extern crate std;
-
 pub mod bus;
 pub mod codec;
 pub mod codes;
 pub mod counters;
 pub mod e2e;
 pub mod frame;
-#[cfg(feature = "std")]
-pub mod link;
+pub mod hash;
 pub mod messages;
 mod packed;
 pub mod schema;
 mod signals;
 pub mod slcan;
 pub mod table;
+pub mod wire;

@@ -21,7 +21,8 @@
 //! What is cyclic and urgent thereby wins arbitration over what is not.
 
 use crate::e2e::Profile;
-use crate::frame;
+use crate::frame::{self, CanFrame, Id};
+use crate::hash;
 use crate::messages::{Node, Server};
 use crate::schema::{Content, Kind, MessageInfo, Rate};
 use crate::signals;
@@ -237,6 +238,25 @@ pub const fn emergency(node: Node) -> &'static MessageInfo {
         Node::Drives => &DRIVES_EMERGENCY,
         Node::Controller => &CONTROLLER_EMERGENCY,
         Node::Operator => &OPERATOR_EMERGENCY,
+    }
+}
+
+/// Hash of the whole table, computed at compile time: two nodes of one hash agree on every identifier, length, offset,
+/// type, range, unit and code.
+pub const HASH: u32 = hash::schema(&TABLE);
+
+/// Message of this 11-bit identifier, or `None`.
+#[must_use]
+pub fn find(id: u16) -> Option<&'static MessageInfo> {
+    TABLE.iter().copied().find(|info| info.id == id)
+}
+
+/// Message that a frame carries by its identifier, or `None`: no extended identifier is in the table.
+#[must_use]
+pub fn of_frame(frame: &CanFrame) -> Option<&'static MessageInfo> {
+    match frame.id() {
+        Id::Standard(id) => find(id.as_raw()),
+        Id::Extended(_) => None,
     }
 }
 

@@ -47,7 +47,7 @@ proptest! {
     #[test]
     fn what_is_sent_is_received(message in message(), counter: u8) {
         let frame = codec::encode(&message, counter).unwrap();
-        let info = MessageInfo::of(frame.raw_id() as u16).unwrap();
+        let info = table::of_frame(&frame).unwrap();
         let counter = info.protection.map(|profile| counter & profile.counter_max());
         prop_assert_eq!(codec::decode(&frame), Ok(Received { message, counter }));
         // Flags of the link do not matter.

@@ -6,9 +6,10 @@ use common::message;
 use proptest::prelude::*;
 use protocol::codec;
 use protocol::e2e::Profile;
+use protocol::hash;
 use protocol::messages::*;
-use protocol::schema::{Content, Kind, MessageInfo, Rate, SCHEMA_HASH, Signal, schema_hash};
-use protocol::table::TABLE;
+use protocol::schema::{Content, Kind, MessageInfo, Rate, Signal};
+use protocol::table::{self, TABLE};
 
 /// Values of the signals present in a frame, read by nothing but the table.
 fn by_table(info: &MessageInfo, data: &[u8]) -> Vec<(&'static str, Vec<f64>)> {
@@ -219,7 +220,7 @@ proptest! {
     #[test]
     fn table_and_struct_give_one_layout(message in message()) {
         let frame = codec::encode(&message, 0).unwrap();
-        let info = MessageInfo::of(frame.raw_id() as u16).unwrap();
+        let info = table::of_frame(&frame).unwrap();
         prop_assert_eq!(info.content, content(&message));
         prop_assert_eq!((frame.is_fd(), frame.data().len()), (info.is_fd(), info.len));
         prop_assert_eq!(by_table(info, frame.data()), by_struct(&message));
@@ -371,16 +372,16 @@ fn emergency_codes_agree_with_the_register() {
 /// Whatever changes the meaning of a byte changes the hash.
 #[test]
 fn the_hash_sees_every_part_of_the_table() {
-    assert_eq!(schema_hash(&TABLE), SCHEMA_HASH);
+    assert_eq!(hash::schema(&TABLE), table::HASH);
     // FNV-1a of nothing is its offset basis.
-    assert_eq!(schema_hash(&[]), 0x811C_9DC5);
-    let mut hashes = vec![SCHEMA_HASH];
+    assert_eq!(hash::schema(&[]), 0x811C_9DC5);
+    let mut hashes = vec![table::HASH];
     let mut hash_with = |k: usize, change: &dyn Fn(&mut MessageInfo)| {
         let mut info = *TABLE[k];
         change(&mut info);
         let mut table = TABLE;
         table[k] = &info;
-        hashes.push(schema_hash(&table));
+        hashes.push(hash::schema(&table));
     };
     for (k, signals) in TABLE.iter().map(|info| info.signals).enumerate() {
         hash_with(k, &|info| info.name = "Other");

@@ -5,11 +5,11 @@
 
 echo "- every fault, planted into a moving arm"
 faults=$(built mps2-an386 --bin mps2-an386-faults)
-timeout 120 "$plant_sim" faults --image "$faults"
+timeout 120 "$plant_sim" crash --image "$faults"
 
 echo "- the image that goes into runs obeys no request to fail, only network management's reset; that is seen"
 image=$(built mps2-an386 --bin mps2-an386)
-if timeout 120 "$plant_sim" faults --image "$image" >"$scratch/production" 2>&1; then
+if timeout 120 "$plant_sim" crash --image "$image" >"$scratch/production" 2>&1; then
     echo "33-faults: the production image has planted faults" >&2
     exit 1
 fi

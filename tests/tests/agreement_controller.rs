@@ -10,15 +10,17 @@ mod magnitude;
 
 use std::f64::consts::{PI, TAU};
 
-use firmware::arm::{ArmModel, Axis, DriveTrain, Geometry, IRB_930, JointLimits, Link, Payload};
-use firmware::dynamics::drive::Drive;
-use firmware::dynamics::lagrange::Lagrange;
-use firmware::dynamics::newton_euler;
-use firmware::jacobian::Jacobian;
-use firmware::kinematics::{
+use firmware::mechanics::arm::{
+    ArmModel, Axis, DriveTrain, Geometry, IRB_930, JointLimits, Link, Payload,
+};
+use firmware::mechanics::dynamics::drive::Drive;
+use firmware::mechanics::dynamics::lagrange::Lagrange;
+use firmware::mechanics::dynamics::newton_euler;
+use firmware::mechanics::jacobian::Jacobian;
+use firmware::mechanics::kinematics::{
     Elbow, IkError, Pose, REACH_TOLERANCE, Trig, forward, inverse, link_frames, rotation, solve,
 };
-use firmware::velocity::propagate;
+use firmware::mechanics::velocity::propagate;
 use magnitude::{LAGRANGE, NEWTON_EULER};
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
 use tests::{Row, Table, reference};

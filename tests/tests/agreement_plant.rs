@@ -1,10 +1,10 @@
 //! The plant against Pinocchio and MuJoCo, quantity by quantity.
 
 use nalgebra::{SMatrix, Vector4};
-use plant_sim::model::{Payload, RobotModel};
-use plant_sim::plant::arm::Arm;
-use plant_sim::plant::drive::Drive;
-use plant_sim::plant::kinematics::{self, Pose, Unreachable, Violation};
+use sim::model::{Payload, RobotModel};
+use sim::plant::arm::Arm;
+use sim::plant::drive::Drive;
+use sim::plant::kinematics::{self, Pose, Unreachable, Violation};
 use tests::{Row, Table, reference};
 
 /// Absolute, in the unit of the quantity. The tables hold efforts up to 2e3 N m, each the sum of some hundred
@@ -12,7 +12,8 @@ use tests::{Row, Table, reference};
 const TOLERANCE: f64 = 1e-9;
 
 fn model() -> RobotModel {
-    let (model, warnings) = RobotModel::load(&reference("model.json")).unwrap();
+    let (model, warnings) =
+        RobotModel::from_json(&std::fs::read_to_string(reference("model.json")).unwrap()).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
     model
 }

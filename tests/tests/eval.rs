@@ -1,7 +1,7 @@
 //! The reference tables piped through `eval`, whole, and compared column by column.
 
 use plant_sim::eval::{By, Table, eval};
-use plant_sim::model::{Payload, RobotModel};
+use sim::model::{Payload, RobotModel};
 use tests::reference;
 
 /// Header and rows of a CSV text.

@@ -6,10 +6,10 @@ use protocol::messages::{Refusal, RefusalReason};
 use super::Reference;
 use super::path::PathPoint;
 use super::profile::{Bounds, Sample};
-use crate::arm::{ArmModel, Axis};
-use crate::body::Body;
-use crate::kinematics::Trig;
-use crate::math::{cbrt, clamp, sqrt};
+use crate::mechanics::arm::{ArmModel, Axis};
+use crate::mechanics::body::Body;
+use crate::mechanics::kinematics::Trig;
+use crate::mechanics::math::{cbrt, clamp, sqrt};
 
 /// Share of the torque that a plan may use. The rest is for the feedback: payload and friction
 /// are never known exactly, and a saturated axis leaves the path.

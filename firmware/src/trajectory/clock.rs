@@ -3,8 +3,8 @@
 use nalgebra::Vector4;
 
 use super::Reference;
-use crate::arm::JointLimits;
-use crate::math::sqrt;
+use crate::mechanics::arm::JointLimits;
+use crate::mechanics::math::sqrt;
 
 /// Share of the jerk limit that a stop may use: the move's own jerk keeps the rest.
 const STOP_JERK_SHARE: f32 = 0.5;

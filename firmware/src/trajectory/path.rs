@@ -2,9 +2,9 @@
 
 use nalgebra::Vector4;
 
-use crate::arm::{ArmModel, Axis};
-use crate::jacobian::Jacobian;
-use crate::kinematics::{self, Elbow, IkError, Pose, Trig};
+use crate::mechanics::arm::{ArmModel, Axis};
+use crate::mechanics::jacobian::Jacobian;
+use crate::mechanics::kinematics::{self, Elbow, IkError, Pose, Trig};
 
 /// Joint positions and their derivatives with respect to the path coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]

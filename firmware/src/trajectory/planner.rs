@@ -27,7 +27,7 @@ use super::path::{Path, PathPoint, check_limits};
 use super::profile::{Bounds, SCurve, Sample};
 use super::request::{Gate, Request, Target, from_ik, from_path};
 use super::{Lift, Trajectory};
-use crate::arm::ArmModel;
+use crate::mechanics::arm::ArmModel;
 use verify::LINE_STEPS;
 
 /// Points of the survey of a line.

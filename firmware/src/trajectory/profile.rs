@@ -10,7 +10,7 @@
 //!                         \____/     the other half, mirrored in time
 //! ```
 
-use crate::math::{cbrt, sqrt};
+use crate::mechanics::math::{cbrt, sqrt};
 
 /// Value and first three time derivatives of the path coordinate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -9,7 +9,7 @@ use super::clock::Clock;
 use super::planner::Planner;
 use super::request::Request;
 use super::{Reference, Trajectory};
-use crate::arm::ArmModel;
+use crate::mechanics::arm::ArmModel;
 
 /// Requests that may wait, and planned moves that may wait.
 pub const CAPACITY: usize = 4;

@@ -4,9 +4,9 @@ use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
 use super::path::{MIN_SIN_ELBOW, Path, PathError, check_limits};
-use crate::arm::ArmModel;
-use crate::kinematics::{self, Elbow, IkError, Pose};
-use crate::math::wrap;
+use crate::mechanics::arm::ArmModel;
+use crate::mechanics::kinematics::{self, Elbow, IkError, Pose};
+use crate::mechanics::math::wrap;
 
 /// What to move to. Lengths in m in frame 0 (z up), angles in rad.
 #[derive(Clone, Copy, Debug, PartialEq)]

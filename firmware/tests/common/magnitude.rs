@@ -17,7 +17,7 @@
 //! Lagrange's closed form has 32 (see its own documentation), on terms that are the same products of lengths, except that it
 //! has |x| + |y| for the length of a first moment of mass, at most sqrt 2 times it: 46.
 
-use firmware::arm::{ArmModel, Payload};
+use firmware::mechanics::arm::{ArmModel, Payload};
 use nalgebra::{Matrix4, Vector4};
 
 /// Roundings of the recursive Newton-Euler algorithm.

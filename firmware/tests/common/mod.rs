@@ -3,7 +3,7 @@
 
 pub mod magnitude;
 
-use firmware::arm::{ArmModel, Geometry, IRB_930, Link, Payload};
+use firmware::mechanics::arm::{ArmModel, Geometry, IRB_930, Link, Payload};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 

@@ -7,14 +7,14 @@ use std::process::ExitCode;
 use std::rc::Rc;
 
 use clap::Args;
-use firmware::phase::Phase;
-use plant_sim::model::RobotModel;
+use firmware::control::phase::Phase;
+use plant_sim::input;
 use plant_sim::qemu::{self, COST_IMAGE, Channel, Costs, IMAGE, Options, Poll, Qemu};
-use plant_sim::run::{self, RunConfig};
-use plant_sim::scenario::Scenario;
-use plant_sim::selection::LawChoice;
 use protocol::table::FEEDBACK;
 use serde::Serialize;
+use sim::run::with_controller;
+use sim::selection::LawChoice;
+use sim::setup::RunConfig;
 
 use super::show;
 
@@ -62,23 +62,17 @@ fn measure(args: &CostArgs, image: Option<&PathBuf>, program: &str) -> Result<Co
         Some(image) => image.clone(),
         None => qemu::build(program).map_err(|error| error.to_string())?,
     };
-    let mut scenario = Scenario::open(&args.scenario).map_err(|error| error.to_string())?;
+    let mut scenario = input::scenario(&args.scenario).map_err(|error| error.to_string())?;
     scenario.law = args.law;
     scenario.cycles = 2;
-    let model = RobotModel::irb_930_22_105();
-    let config = RunConfig {
-        scenario,
-        plant_model: model.clone(),
-        model,
-        seed: 1,
-    };
+    let config = RunConfig::new(scenario);
     let costs = Rc::new(RefCell::new(Costs::default()));
     let options = Options {
         image: Some(image),
         channel: Channel::Fifo,
         count: Some(Rc::clone(&costs)),
     };
-    let summary = run::execute_with(&config, None, |config| Qemu::start(config, &options))
+    let summary = with_controller(&config, |config| Qemu::start(config, &options), &mut ())
         .map_err(|error| error.to_string())?;
     if let Some(error) = summary.error {
         return Err(format!("the run was not completed: {error}"));

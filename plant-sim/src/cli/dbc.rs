@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use plant_sim::dbc;
+use plant_sim::output;
+use trace::dbc;
 
 use super::show;
 
@@ -20,8 +21,7 @@ pub struct DbcArgs {
 pub fn run(args: &DbcArgs) -> Result<ExitCode, String> {
     let text = dbc::generate();
     match &args.out {
-        Some(path) => std::fs::write(path, text)
-            .map_err(|error| format!("cannot write {}: {error}", path.display()))?,
+        Some(path) => output::write(path, &text).map_err(|error| error.to_string())?,
         None => show(&text)?,
     }
     Ok(ExitCode::SUCCESS)

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use plant_sim::eval::{By, Table, eval};
-use plant_sim::model::Payload;
+use plant_sim::input;
 
 use super::{run, show};
 
@@ -32,7 +32,7 @@ pub fn run(args: &EvalArgs) -> Result<ExitCode, String> {
     let model = run::load(args.model.as_ref())?;
     let payload = match &args.payload {
         None => None,
-        Some(path) => Some(Payload::load(path).map_err(|error| error.to_string())?),
+        Some(path) => Some(input::payload(path).map_err(|error| error.to_string())?),
     };
     let mut output = Vec::new();
     eval(

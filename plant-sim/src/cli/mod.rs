@@ -1,9 +1,9 @@
 //! The command line: one file a subcommand.
 
 mod cost;
+mod crash;
 mod dbc;
 mod eval;
-mod faults;
 mod model;
 mod monitor;
 mod run;
@@ -33,7 +33,7 @@ enum Command {
     /// Count the instructions and the stack that the controller takes on the emulated Cortex-M4F.
     Cost(cost::CostArgs),
     /// Plant faults into the controller on the emulated Cortex-M4F, and see where they end.
-    Faults(faults::FaultsArgs),
+    Crash(crash::CrashArgs),
     /// Compute kinematics or dynamics for the rows of a CSV table on standard input.
     Eval(eval::EvalArgs),
     /// Measure how regular the loop with an external controller is, beside what watches over it.
@@ -56,7 +56,7 @@ pub fn main() -> Result<ExitCode, String> {
         None => run::run(&cli.run),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Cost(args)) => cost::run(&args),
-        Some(Command::Faults(args)) => faults::run(&args),
+        Some(Command::Crash(args)) => crash::run(&args),
         Some(Command::Eval(args)) => eval::run(&args),
         Some(Command::Timing(args)) => timing::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),

@@ -7,7 +7,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use firmware::arm::ArmModel;
+use firmware::mechanics::arm::ArmModel;
+
+use plant_sim::output;
 
 use super::run::load;
 use super::show;
@@ -29,8 +31,7 @@ pub fn run(args: &ModelArgs) -> Result<ExitCode, String> {
         .map_err(|error| format!("the controller cannot work with this robot: {error}"))?;
     let text = serde_json::to_string_pretty(&arm).map_err(|error| error.to_string())? + "\n";
     match &args.out {
-        Some(path) => std::fs::write(path, text)
-            .map_err(|error| format!("cannot write {}: {error}", path.display()))?,
+        Some(path) => output::write(path, &text).map_err(|error| error.to_string())?,
         None => show(&text)?,
     }
     Ok(ExitCode::SUCCESS)

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
+use link::{Link, LinkAddress, Stamped};
 use plant_sim::monitor::Monitor;
-use plant_sim::trace::{Entry, Interface, Record};
-use protocol::link::{Link, LinkAddress, Stamped};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
+use trace::{Entry, Interface, Record};
 
 /// Time between two pictures.
 const REFRESH: Duration = Duration::from_millis(100);

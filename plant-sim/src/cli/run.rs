@@ -7,14 +7,16 @@ use std::process::ExitCode;
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use plant_sim::endpoint::InProcess;
+use link::{AddressError, LinkAddress, SlcanPeer};
 use plant_sim::external::{LockStep, RealTime, Watched};
-use plant_sim::model::RobotModel;
+use plant_sim::input;
 use plant_sim::qemu::{self, Channel, Qemu};
-use plant_sim::run::{self, RunConfig, Summary};
-use plant_sim::scenario::{self, Scenario};
-use plant_sim::selection::LawChoice;
-use protocol::link::{AddressError, LinkAddress, SlcanPeer};
+use plant_sim::run::{self, Results};
+use sim::endpoint::InProcess;
+use sim::model::RobotModel;
+use sim::scenario;
+use sim::selection::LawChoice;
+use sim::setup::RunConfig;
 
 use super::show;
 
@@ -60,9 +62,6 @@ pub struct RunArgs {
     /// adapter. The run waits for the first and goes at the speed of the clock.
     #[arg(long, value_name = "slcan:tcp:HOST:PORT")]
     listen: Option<LinkAddress>,
-    /// Seed of everything random.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
     /// The robot that the controller believes in (a model file); also the true one, unless
     /// --plant-model says otherwise. An external controller is told the same: plant-sim model FILE.
     #[arg(long, value_name = "FILE")]
@@ -113,7 +112,7 @@ impl FromStr for BusChoice {
 /// Runs the scenario, writes the results and shows the summary.
 pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let place = place(args)?;
-    let mut scenario = Scenario::open(&args.scenario).map_err(|error| error.to_string())?;
+    let mut scenario = input::scenario(&args.scenario).map_err(|error| error.to_string())?;
     if let Some(law) = args.law {
         scenario.law = law;
     }
@@ -133,7 +132,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
                 model.payload_max, model.name
             ));
         }
-        scenario.payload = run::payload_of(&scenario, kg);
+        scenario.payload = scenario.payload_of(kg);
     }
     let plant_model = match &args.plant_model {
         Some(_) => load(args.plant_model.as_ref())?,
@@ -141,13 +140,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     };
     let config = RunConfig {
         scenario,
-        model,
-        plant_model,
-        seed: args.seed,
+        nominal: model,
+        actual: plant_model,
     };
-    let summary = match place {
-        Place::InProcess => run::execute(&config, Some(&args.out)),
-        Place::Watched(server) => run::execute_with(&config, Some(&args.out), |config| {
+    let results = match place {
+        Place::InProcess => run::execute(&config, &args.out),
+        Place::Watched(server) => run::execute_with(&config, &args.out, |config| {
             Watched::new(InProcess::new(config), server)
         }),
         Place::Qemu => {
@@ -160,37 +158,36 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
                 count: None,
             };
             let mut controller = None;
-            let summary = run::execute_with(&config, Some(&args.out), |config| {
+            let results = run::execute_with(&config, &args.out, |config| {
                 Ok(controller.insert(Qemu::start(config, &options)?))
             });
             if let Some(controller) = &mut controller {
                 keep_log(controller, &args.out.join("controller.log"));
             }
-            summary
+            results
         }
-        Place::LockStep(bus) => run::execute_with(&config, Some(&args.out), |config| {
-            LockStep::connect(bus, config)
-        }),
+        Place::LockStep(bus) => {
+            run::execute_with(&config, &args.out, |config| LockStep::connect(bus, config))
+        }
         Place::RealTime(bus) => {
             let mut controller = None;
-            let summary = run::execute_with(&config, Some(&args.out), |config| {
+            let results = run::execute_with(&config, &args.out, |config| {
                 Ok(controller.insert(RealTime::connect(bus, config)?))
             });
             if let Some(controller) = &controller {
                 eprint!("{}", controller.timing().report());
                 eprintln!("  commands unlike the twin's {}", controller.different());
             }
-            summary
+            results
         }
     }
     .map_err(|error| error.to_string())?;
     if args.json {
-        let json = serde_json::to_string_pretty(&summary).map_err(|error| error.to_string())?;
-        show(&(json + "\n"))?;
+        show(&results.to_json())?;
     } else {
-        show(&report(&summary, &args.out))?;
+        show(&report(&results, &args.out))?;
     }
-    match &summary.error {
+    match &results.summary.error {
         None => Ok(ExitCode::SUCCESS),
         Some(error) => Err(format!("the run was not completed: {error}")),
     }
@@ -255,7 +252,7 @@ pub fn load(path: Option<&PathBuf>) -> Result<RobotModel, String> {
     let Some(path) = path else {
         return Ok(RobotModel::irb_930_22_105());
     };
-    let (model, warnings) = RobotModel::load(path).map_err(|error| error.to_string())?;
+    let (model, warnings) = input::robot(path).map_err(|error| error.to_string())?;
     for warning in warnings {
         eprintln!("plant-sim: warning: {}: {warning}", path.display());
     }
@@ -270,7 +267,8 @@ macro_rules! line {
 }
 
 /// The summary as a person reads it.
-fn report(summary: &Summary, out: &Path) -> String {
+fn report(results: &Results, out: &Path) -> String {
+    let summary = &results.summary;
     let mut text = String::new();
     let percent = |shares: &[f64; 4]| {
         shares
@@ -363,8 +361,8 @@ fn report(summary: &Summary, out: &Path) -> String {
         text,
         "  simulated         {:.2} s in {:.3} s: {:.0} times real time",
         summary.sim_time_s,
-        summary.wall_time_s,
-        summary.real_time_factor
+        results.wall_time_s,
+        results.real_time_factor
     );
     line!(
         text,

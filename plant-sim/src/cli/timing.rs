@@ -1,14 +1,14 @@
 //! `plant-sim timing`: how regular the loop is on this machine and this bus.
 
-use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
+use link::LinkAddress;
 use plant_sim::external::{histogram, measure};
-use plant_sim::scenario;
-use protocol::link::LinkAddress;
+use plant_sim::output;
+use sim::scenario;
 
 use super::show;
 
@@ -36,8 +36,7 @@ pub fn run(args: &TimingArgs) -> Result<ExitCode, String> {
         .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
     let time = Duration::from_secs(args.seconds.into());
     let timing = measure(&args.bus, args.rate, time).map_err(|error| error.to_string())?;
-    fs::write(&args.svg, histogram(&timing))
-        .map_err(|error| format!("cannot write {}: {error}", args.svg.display()))?;
+    output::write(&args.svg, &histogram(&timing)).map_err(|error| error.to_string())?;
     show(&timing.report())?;
     show(&format!("histogram in {}\n", args.svg.display()))?;
     Ok(ExitCode::SUCCESS)

@@ -4,27 +4,27 @@
 
 mod source;
 
-use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::{Args, Subcommand, ValueEnum};
-use firmware::arm::ArmModel;
-use plant_sim::bus::BitTiming;
-use plant_sim::model::RobotModel;
-use plant_sim::rig::RigConfig;
-use plant_sim::scenario;
-use plant_sim::trace::Record;
-use plant_sim::trace::check::Checker;
-use plant_sim::trace::convert::{Converter, Target};
-use plant_sim::trace::decode::{Decoder, Format};
-use plant_sim::trace::play::{PlayError, Player};
-use plant_sim::trace::plot::Plot;
-use plant_sim::trace::replay::Replay;
-use plant_sim::trace::stats::Gatherer;
-use protocol::link::{Link, LinkAddress, SlcanPeer};
+use firmware::mechanics::arm::ArmModel;
+use link::{Link, LinkAddress, SlcanPeer};
+use plant_sim::check::Checker;
+use plant_sim::output;
+use plant_sim::play::{PlayError, Player};
+use plant_sim::plot::Plot;
+use plant_sim::replay::Replay;
+use protocol::wire::BitTiming;
+use sim::model::RobotModel;
+use sim::rig::RigConfig;
+use sim::scenario;
+use trace::Record;
+use trace::convert::{Converter, Target};
+use trace::decode::{Decoder, Format};
+use trace::stats::Gatherer;
 
 use super::run::load;
 use super::show;
@@ -181,9 +181,8 @@ fn decode(args: &DecodeArgs) -> Result<ExitCode, String> {
         FormatChoice::Jsonl => Format::JsonLines,
     };
     let mut source = Source::open(&args.file)?;
-    let out = args.out.as_deref();
-    written(out, || {
-        let mut decoder = Decoder::new(sink(out)?, format)?;
+    written(args.out.as_deref(), |sink| {
+        let mut decoder = Decoder::new(sink, format)?;
         each(&mut source, |record| decoder.record(record))?;
         decoder.finish()?;
         Ok(())
@@ -198,9 +197,8 @@ fn convert(args: &ConvertArgs) -> Result<ExitCode, String> {
         TargetChoice::Candump => Target::Candump,
     };
     let mut source = Source::open(&args.file)?;
-    let out = args.out.as_deref();
-    written(out, || {
-        let mut converter = Converter::new(sink(out)?, target)?;
+    written(args.out.as_deref(), |sink| {
+        let mut converter = Converter::new(sink, target)?;
         each(&mut source, |record| converter.record(record))?;
         converter.finish()?;
         Ok(())
@@ -231,9 +229,7 @@ fn plot(args: &PlotArgs) -> Result<ExitCode, String> {
     while let Some(record) = source.record()? {
         plot.record(&record);
     }
-    let out = args.out.as_deref();
-    written(out, || {
-        let mut sink = sink(out)?;
+    written(args.out.as_deref(), |sink| {
         sink.write_all(plot.svg().as_bytes())?;
         sink.flush()?;
         Ok(())
@@ -264,8 +260,8 @@ fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
         .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
     let model: RobotModel = load(args.model.as_ref())?;
     let config = RigConfig {
-        believed: ArmModel::from(&model),
-        plant: model,
+        nominal: ArmModel::from(&model),
+        actual: model,
         rate_hz: args.rate,
         start: [0.0; 4],
         timing: BitTiming::default(),
@@ -339,36 +335,25 @@ fn each(
     Ok(())
 }
 
-/// The file, or standard output. A file appears under its name when it is complete: until then it is a partial one.
-fn sink(out: Option<&Path>) -> io::Result<BufWriter<Box<dyn Write>>> {
-    let sink: Box<dyn Write> = match out {
-        Some(path) => Box::new(File::create(partial(path))?),
-        None => Box::new(io::stdout().lock()),
+/// Does the writing, to the file or to standard output. A reader of standard output that has seen enough and gone
+/// (`| head`) is no error.
+fn written(
+    out: Option<&Path>,
+    write: impl FnOnce(&mut dyn Write) -> Result<(), Failure>,
+) -> Result<(), String> {
+    let Some(path) = out else {
+        let mut sink = BufWriter::with_capacity(1 << 16, io::stdout().lock());
+        return match write(&mut sink) {
+            Ok(()) => Ok(()),
+            Err(Failure::Input(message)) => Err(message),
+            Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+            Err(Failure::Output(error)) => Err(format!("cannot write to standard output: {error}")),
+        };
     };
-    Ok(BufWriter::with_capacity(1 << 16, sink))
-}
-
-fn partial(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".partial");
-    name.into()
-}
-
-/// Does the writing. A reader of standard output that has seen enough and gone (`| head`) is no error.
-fn written(out: Option<&Path>, write: impl FnOnce() -> Result<(), Failure>) -> Result<(), String> {
-    let result = write().and_then(|()| match out {
-        Some(path) => Ok(fs::rename(partial(path), path)?),
-        None => Ok(()),
-    });
-    match (result, out) {
-        (Ok(()), _) => Ok(()),
-        (Err(Failure::Input(message)), _) => Err(message),
-        (Err(Failure::Output(error)), None) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        (Err(Failure::Output(error)), None) => {
-            Err(format!("cannot write to standard output: {error}"))
-        }
-        (Err(Failure::Output(error)), Some(path)) => {
-            Err(format!("cannot write {}: {error}", path.display()))
-        }
+    let mut file = output::File::create(path).map_err(|error| error.to_string())?;
+    match write(&mut file) {
+        Ok(()) => file.persist().map_err(|error| error.to_string()),
+        Err(Failure::Input(message)) => Err(message),
+        Err(Failure::Output(error)) => Err(format!("cannot write {}: {error}", path.display())),
     }
 }

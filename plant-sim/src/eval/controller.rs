@@ -2,14 +2,16 @@
 
 use super::cell::{Cell, Reach, ik_cells};
 use super::{EvalError, Side};
-use crate::model::{self, RobotModel};
-use firmware::arm::{ArmModel, Axis, Payload};
-use firmware::dynamics::drive::Drive;
-use firmware::dynamics::lagrange::Lagrange;
-use firmware::dynamics::newton_euler;
-use firmware::jacobian::Jacobian;
-use firmware::kinematics::{Elbow, IkError, Pose, Trig, forward_with, inverse, rotation, solve};
+use firmware::mechanics::arm::{ArmModel, Axis, Payload};
+use firmware::mechanics::dynamics::drive::Drive;
+use firmware::mechanics::dynamics::lagrange::Lagrange;
+use firmware::mechanics::dynamics::newton_euler;
+use firmware::mechanics::jacobian::Jacobian;
+use firmware::mechanics::kinematics::{
+    Elbow, IkError, Pose, Trig, forward_with, inverse, rotation, solve,
+};
 use nalgebra::{Matrix4, Vector4, Vector6};
+use sim::model::{self, RobotModel};
 
 pub(super) struct Controller {
     method: Method,

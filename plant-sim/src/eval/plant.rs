@@ -2,11 +2,11 @@
 
 use super::Side;
 use super::cell::{Cell, Reach, ik_cells};
-use crate::model::{Geometry, Payload, RobotModel};
-use crate::plant::arm::Arm;
-use crate::plant::drive::Drive;
-use crate::plant::kinematics::{Pose, Unreachable, Violation, inverse};
 use nalgebra::Vector4;
+use sim::model::{Geometry, Payload, RobotModel};
+use sim::plant::arm::Arm;
+use sim::plant::drive::Drive;
+use sim::plant::kinematics::{Pose, Unreachable, Violation, inverse};
 
 pub(super) struct PlantSide {
     model: RobotModel,

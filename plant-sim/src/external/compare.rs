@@ -1,7 +1,7 @@
 //! The first difference between the frame that was due and the one that came, as a person looks for it.
 
-use protocol::frame::{CanFrame, Id};
-use protocol::schema::MessageInfo;
+use protocol::frame::CanFrame;
+use protocol::table;
 
 /// Names the first difference: message, field, and the bytes of both.
 pub fn first_difference(expected: Option<&CanFrame>, found: &CanFrame) -> String {
@@ -24,20 +24,13 @@ pub fn first_difference(expected: Option<&CanFrame>, found: &CanFrame) -> String
     format!("{}, {field} ({found} instead of {expected})", name(found))
 }
 
-fn info(frame: &CanFrame) -> Option<&'static MessageInfo> {
-    match frame.id() {
-        Id::Standard(id) => MessageInfo::of(id.as_raw()),
-        Id::Extended(_) => None,
-    }
-}
-
 fn name(frame: &CanFrame) -> &'static str {
-    info(frame).map_or("a frame that is none of ours", |info| info.name)
+    table::of_frame(frame).map_or("a frame that is none of ours", |info| info.name)
 }
 
 /// Field that this byte belongs to.
 fn field(frame: &CanFrame, byte: usize) -> String {
-    let signal = info(frame).and_then(|info| {
+    let signal = table::of_frame(frame).and_then(|info| {
         info.signals
             .iter()
             .find(|signal| (signal.offset..signal.end()).contains(&byte))

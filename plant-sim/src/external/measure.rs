@@ -2,16 +2,16 @@
 
 use std::time::Duration;
 
-use firmware::arm::ArmModel;
-use firmware::controller::Config;
-use protocol::link::LinkAddress;
+use firmware::control::controller::Config;
+use firmware::mechanics::arm::ArmModel;
+use link::LinkAddress;
 
 use super::RealTime;
 use super::timing::Timing;
-use crate::drives::Drives;
-use crate::endpoint::{Endpoint, EndpointError};
-use crate::model::RobotModel;
-use crate::plant::Plant;
+use sim::drives::Drives;
+use sim::endpoint::{Endpoint, EndpointError};
+use sim::model::RobotModel;
+use sim::plant::Plant;
 
 /// Exchanges feedback and commands with the controller on `bus`, `rate_hz` times a second for `time`. The brake stays
 /// closed: nothing moves, and the controller is never asked to.

@@ -2,15 +2,15 @@
 
 use std::time::{Duration, Instant};
 
+use link::{Link, LinkAddress};
 use protocol::bus::Bus;
 use protocol::codec;
-use protocol::frame::{CanFrame, Id};
-use protocol::link::{Link, LinkAddress};
+use protocol::frame::CanFrame;
 use protocol::messages::{Message, Nmt, NmtCommand, Node as Name};
-use protocol::schema::MessageInfo;
+use protocol::table;
 
 use super::Remote;
-use crate::endpoint::EndpointError;
+use sim::endpoint::EndpointError;
 
 /// How long a bus is listened to before taking part: longer than the pause between two signs of a waiting plant.
 const LISTEN: Duration = Duration::from_millis(300);
@@ -21,10 +21,7 @@ const MEET_LIMIT: Duration = Duration::from_secs(60);
 
 /// Node that sends this frame, if only one may.
 pub fn sender(frame: &CanFrame) -> Option<Name> {
-    match frame.id() {
-        Id::Standard(id) => MessageInfo::of(id.as_raw()).and_then(|info| info.sender),
-        Id::Extended(_) => None,
-    }
+    table::of_frame(frame).and_then(|info| info.sender)
 }
 
 /// Opens the bus, makes sure that no other plant is on it, and waits until a controller is, which starts afresh.

@@ -3,19 +3,19 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use firmware::controller::Config;
+use firmware::control::controller::Config;
 use firmware::node::Node;
+use link::LinkAddress;
+use link::realtime::{claim, monotonic, sleep_until};
 use protocol::bus::Bus;
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::link::LinkAddress;
-use protocol::link::realtime::{claim, monotonic, sleep_until};
 use protocol::messages::{Message, Node as Name};
 
 use super::peers::{self, sender};
 use super::timing::Timing;
 use super::{Remote, Sent, first_difference, twin};
-use crate::endpoint::{Endpoint, EndpointError};
+use sim::endpoint::{Endpoint, EndpointError};
 
 /// Time between the end of the preparations and the first sample.
 const RUN_UP: Duration = Duration::from_millis(5);

@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use firmware::controller::MAX_GAP;
+use firmware::control::controller::MAX_GAP;
 use firmware::node::PEER_TIMEOUT_US;
 
-use crate::drives::HOLD_SAMPLES;
+use sim::drives::HOLD_SAMPLES;
 
 /// Width of a class of the histogram, ns.
 const CLASS_NS: u64 = 1_000;

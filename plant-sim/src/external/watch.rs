@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use firmware::node::Node;
+use link::realtime::{monotonic, sleep_until};
+use link::{Clients, Link, SlcanHub};
 use protocol::bus::Bus as _;
 use protocol::frame::CanFrame;
-use protocol::link::realtime::{monotonic, sleep_until};
-use protocol::link::{Clients, Link, SlcanHub};
 
-use crate::endpoint::{Endpoint, EndpointError};
+use sim::endpoint::{Endpoint, EndpointError};
 
 /// Between two looks for a client.
 const PATIENCE: Duration = Duration::from_millis(100);

@@ -8,8 +8,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Cell, Paragraph, Row, Table};
 
 use super::Monitor;
-use crate::trace::decode::describe;
-use crate::trace::stats::{IdStatistics, Statistics};
+use trace::decode::describe;
+use trace::stats::{IdStatistics, Statistics};
 
 const BOLD: Style = Style::new().add_modifier(Modifier::BOLD);
 const GREY: Style = Style::new().fg(Color::DarkGray);

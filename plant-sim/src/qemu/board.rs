@@ -14,16 +14,16 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use firmware::reset::Stop;
-use mps2_an386::{
+use channel::{
     Channel, FRAME_LEN, GREETING_LEN, Measured, REPLY_HEADER, Request, SETUP_LEN, Setup,
     frame_from_bytes, greeted, is_greeting, reply_header,
 };
+use firmware::cabinet::reset::Stop;
 use protocol::frame::CanFrame;
 
 use super::failure;
 use super::serial::Serial;
-use crate::endpoint::EndpointError;
+use sim::endpoint::EndpointError;
 
 const EMULATOR: &str = "qemu-system-arm";
 /// How often the child is looked at.
@@ -395,7 +395,7 @@ fn unusable(path: &Path, error: &io::Error) -> EndpointError {
 
 #[cfg(test)]
 mod tests {
-    use mps2_an386::{Reply, greeting};
+    use channel::{Reply, greeting};
     use protocol::messages::ResetReason;
 
     use super::*;

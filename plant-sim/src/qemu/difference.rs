@@ -3,7 +3,7 @@
 use protocol::frame::CanFrame;
 use protocol::messages::Message;
 
-use crate::trace::fields::{Decoded, full_name};
+use trace::fields::{Decoded, full_name};
 
 /// What is different first, or `None` if every frame is equal, byte for byte.
 pub fn first(expected: &[CanFrame], sent: &[CanFrame], now: u64) -> Option<String> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use super::failure;
-use crate::endpoint::EndpointError;
+use sim::endpoint::EndpointError;
 
 const PACKAGE: &str = "mps2-an386";
 

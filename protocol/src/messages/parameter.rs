@@ -114,7 +114,7 @@ codes! {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
-    /// [`SCHEMA_HASH`](crate::schema::SCHEMA_HASH) of the sender.
+    /// [`table::HASH`](crate::table::HASH) of the sender.
     #[serde(with = "postcard::fixint::le")]
     pub schema: u32,
     /// Identifies the build, by the sender's own rule.

@@ -1,9 +1,9 @@
 //! The controller's laws as the paper writes them: in continuous time, without friction and rotors.
 
-use firmware::arm::{ArmModel, DriveTrain, IRB_930};
-use firmware::body::Body;
-use firmware::kinematics::Trig;
-use firmware::laws::{Gains, Memory, Model, Motion, Selection, Situation, Task};
+use firmware::control::laws::{Gains, Memory, Model, Motion, Selection, Situation, Task};
+use firmware::mechanics::arm::{ArmModel, DriveTrain, IRB_930};
+use firmware::mechanics::body::Body;
+use firmware::mechanics::kinematics::Trig;
 use firmware::trajectory::Reference;
 use nalgebra::Vector4;
 use protocol::messages::{Compensation, Law};

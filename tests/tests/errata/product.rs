@@ -4,14 +4,14 @@
 //! errors that the controller documents for its own functions. They are for states inside the joint limits, whose angles
 //! sum to at most 2.6 + 2.5 + 7.0 = 12.1 rad, so rounding the inputs to f32 turns the arm by up to 12.1 u.
 
-use firmware::arm::{ArmModel, Axis, Geometry, IRB_930, Payload};
-use firmware::dynamics::drive::Drive;
-use firmware::dynamics::lagrange::Lagrange;
-use firmware::dynamics::newton_euler;
-use firmware::jacobian::Jacobian;
-use firmware::kinematics::{self, Pose, Trig};
-pub use firmware::kinematics::{Elbow, IkError};
-use firmware::velocity::propagate;
+use firmware::mechanics::arm::{ArmModel, Axis, Geometry, IRB_930, Payload};
+use firmware::mechanics::dynamics::drive::Drive;
+use firmware::mechanics::dynamics::lagrange::Lagrange;
+use firmware::mechanics::dynamics::newton_euler;
+use firmware::mechanics::jacobian::Jacobian;
+use firmware::mechanics::kinematics::{self, Pose, Trig};
+pub use firmware::mechanics::kinematics::{Elbow, IkError};
+use firmware::mechanics::velocity::propagate;
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 use tests::{Row, Table};
 
@@ -150,7 +150,7 @@ pub fn rate_product(q: &Vector4<f64>, qd: &Vector4<f64>) -> Vector4<f64> {
 
 /// An angle brought into (-pi, pi].
 pub fn wrap(angle: f64) -> f64 {
-    firmware::math::wrap(angle as f32).into()
+    firmware::mechanics::math::wrap(angle as f32).into()
 }
 
 /// Velocities of frames 1 to 4 in their own axes.

@@ -6,7 +6,7 @@ use core::ptr;
 
 use cortex_m::interrupt;
 use cortex_m::peripheral::{FPU, SCB};
-use firmware::reset::{Record, Stop};
+use firmware::cabinet::reset::{Record, Stop};
 use protocol::messages::ResetReason;
 
 /// The frame could not be written (CFSR: STKERR, MSTKERR).

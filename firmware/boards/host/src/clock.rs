@@ -2,8 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use firmware::sample_clock::SampleClock;
+use firmware::cabinet::sample_clock::SampleClock;
 use protocol::frame::CanFrame;
+use protocol::table;
 
 /// Silence of the drives after which a clock in lock-step runs by itself. Longer than any pause of a loaded machine: a
 /// plant that only computes must not look as if it had died.
@@ -108,5 +109,5 @@ impl Clock {
 }
 
 pub fn is_feedback(frame: &CanFrame) -> bool {
-    !frame.is_extended() && frame.raw_id() == u32::from(protocol::table::FEEDBACK.id)
+    table::FEEDBACK.identifies(frame)
 }

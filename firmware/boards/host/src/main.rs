@@ -12,9 +12,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Parser;
-use firmware::arm::{ArmModel, IRB_930};
-use firmware::controller::Config;
-use protocol::link::{Link, LinkAddress, realtime};
+use firmware::control::controller::Config;
+use firmware::mechanics::arm::{ArmModel, IRB_930};
+use link::{Link, LinkAddress, realtime};
 
 use crate::clock::Clock;
 use crate::shell::Shell;

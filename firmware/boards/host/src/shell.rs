@@ -3,13 +3,13 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-use firmware::controller::Config;
+use firmware::control::controller::Config;
 use firmware::node::Node;
+use link::{Link, LinkError, Stamped};
 use protocol::bus::{Bus, TransmitError};
-use protocol::frame::{CanFrame, Id};
-use protocol::link::{Link, LinkError, Stamped};
+use protocol::frame::CanFrame;
 use protocol::messages::{Mode, Node as Name, ResetReason};
-use protocol::schema::MessageInfo;
+use protocol::table;
 
 use crate::clock::{Clock, is_feedback};
 
@@ -186,10 +186,7 @@ impl Shell {
     }
 
     fn refuse_duplicate(&self, frame: &CanFrame) -> Result<(), ShellError> {
-        let Id::Standard(id) = frame.id() else {
-            return Ok(());
-        };
-        match MessageInfo::of(id.as_raw()) {
+        match table::of_frame(frame) {
             Some(info) if info.sender == Some(Name::Controller) => Err(ShellError::Duplicate {
                 bus: self.bus.clone(),
                 name: info.name,

@@ -9,18 +9,18 @@ mod uart;
 
 use core::sync::atomic::Ordering;
 
-use cortex_m::peripheral::SYST;
-use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m_rt::{entry, exception};
-use firmware::controller::Config;
-use firmware::journal::Journal;
-use firmware::node::Node;
-use firmware::phase::Probe;
-use firmware::reset::Stop;
-use mps2_an386::{
+use channel::{
     Channel, FROM_BOARD, Fault, Measured, REQUEST_LEN, Reply, Request, SETUP_LEN, Setup, TO_BOARD,
     greeting,
 };
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m_rt::{entry, exception};
+use firmware::cabinet::journal::Journal;
+use firmware::cabinet::reset::Stop;
+use firmware::control::controller::Config;
+use firmware::control::phase::Probe;
+use firmware::node::Node;
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;

@@ -11,9 +11,9 @@ mod panic;
 
 #[cfg(target_os = "none")]
 mod metered {
+    use channel::Measured;
     use cortex_m::peripheral::SYST;
-    use firmware::phase::{Phase, Probe};
-    use mps2_an386::Measured;
+    use firmware::control::phase::{Phase, Probe};
 
     use crate::board;
 

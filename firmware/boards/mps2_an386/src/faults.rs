@@ -11,10 +11,10 @@ mod planted {
     use core::hint::black_box;
     use core::panic::PanicInfo;
 
+    use channel::Fault;
     use cortex_m::asm;
     use cortex_m::peripheral::SCB;
     use cortex_m_rt::exception;
-    use mps2_an386::Fault;
     use protocol::messages::ResetReason;
 
     use crate::board::{self, End};

@@ -11,10 +11,10 @@ use cortex_m_rt::entry;
 use defmt_rtt as _;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::wdg::IndependentWatchdog;
-use firmware::arm::IRB_930;
-use firmware::cabinet::Cabinet;
-use firmware::controller::Config;
-use firmware::journal::Journal;
+use firmware::cabinet::journal::Journal;
+use firmware::cabinet::pins::Cabinet;
+use firmware::control::controller::Config;
+use firmware::mechanics::arm::IRB_930;
 use firmware::node::Node;
 use protocol::messages::ResetReason;
 

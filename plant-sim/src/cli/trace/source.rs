@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use plant_sim::trace::{Problem, ReadError, Reader, Record};
+use trace::{Problem, ReadError, Reader, Record};
 
 /// Unreadable lines that are shown; of more, only the number is.
 const SHOWN: u64 = 10;

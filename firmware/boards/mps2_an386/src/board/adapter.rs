@@ -5,9 +5,9 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use firmware::journal::Journal;
+use firmware::cabinet::journal::Journal;
+use firmware::cabinet::sample_clock::SampleClock;
 use firmware::node::Node;
-use firmware::sample_clock::SampleClock;
 use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
 use protocol::slcan::{Line, Parser, Text};

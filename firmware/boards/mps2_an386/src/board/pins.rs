@@ -5,7 +5,7 @@ use core::convert::Infallible;
 use core::ptr;
 
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
-use firmware::cabinet::{Cabinet, TORQUE_OFF};
+use firmware::cabinet::pins::{Cabinet, TORQUE_OFF};
 
 const LEDS: *mut u32 = 0x4002_F004 as *mut u32;
 

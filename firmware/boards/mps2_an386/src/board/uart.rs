@@ -4,7 +4,7 @@
 
 use core::ptr;
 
-use mps2_an386::ring::Ring;
+use channel::ring::Ring;
 
 /// UART 0, which carries frames.
 pub const FRAMES: Uart = Uart(0x4000_4000);

@@ -4,8 +4,8 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::exception;
 use embassy_stm32::pac;
-use firmware::cabinet::TORQUE_OFF;
-use firmware::reset::Stop;
+use firmware::cabinet::pins::TORQUE_OFF;
+use firmware::cabinet::reset::Stop;
 use protocol::messages::ResetReason;
 
 /// Takes torque away and lets the brake close; returns brake, torque and the stack light, on pins 0 to 3 of port C, as

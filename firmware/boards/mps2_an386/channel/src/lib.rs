@@ -1,0 +1,99 @@
+//! What the emulated board and the host that emulates it tell each other, compiled by both of its ends.
+//!
+//! Two FIFOs, standard input and output of the emulator, which the board opens through Arm semihosting. At every start the
+//! board says how it ended before ([`greeting`]), the host what the controller is to know and how frames travel
+//! ([`Setup`]), and the board answers once it is ready ([`Reply`]). Then
+//!
+//! - [`Channel::Fifo`]: the host asks ([`Request`]) and waits for the answer ([`Reply`]) for ever after, and ends the
+//!   conversation by closing its end. This is the path for long comparisons: a round trip takes microseconds.
+//! - [`Channel::Uart`]: frames travel as slcan lines over UART 0, as they would on silicon. An empty line acknowledges a
+//!   frame, after the frames that answer it. `O` opens the bus; `C` closes it, and the board's last [`Reply`] says how
+//!   many bytes its receiver has lost.
+//!
+//! Every record from the host has a fixed length. Numbers are little-endian, frames in records are in the layout of
+//! Linux's `struct canfd_frame`.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::indexing_slicing
+    )
+)]
+
+mod frames;
+mod reply;
+mod request;
+pub mod ring;
+
+use core::ffi::CStr;
+
+use firmware::control::controller::Config;
+use serde::{Deserialize, Serialize};
+
+pub use frames::{FRAME_LEN, frame_from_bytes, frame_to_bytes};
+pub use reply::{
+    GREETING_LEN, Measured, REPLY_FRAMES, REPLY_HEADER, Reply, greeted, greeting, is_greeting,
+    reply_header,
+};
+pub use request::{Fault, REQUEST_LEN, Request};
+
+/// FIFO that the host writes and the board reads. Both can be opened again after a reset.
+pub const TO_BOARD: &CStr = c"/dev/stdin";
+/// FIFO that the board writes and the host reads.
+pub const FROM_BOARD: &CStr = c"/dev/stdout";
+
+/// Bytes of the setup record; more than any setup takes, the rest is zero.
+pub const SETUP_LEN: usize = 768;
+
+/// How frames travel between host and board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Channel {
+    /// In records over the FIFOs.
+    #[default]
+    Fifo,
+    /// As slcan over UART 0.
+    Uart,
+}
+
+/// What the host tells the board before anything else.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Setup {
+    /// How frames travel.
+    pub channel: Channel,
+    /// What the controller is to know.
+    pub config: Config,
+}
+
+impl Setup {
+    /// The record, or `None` if it does not fit.
+    #[must_use]
+    pub fn to_bytes(&self) -> Option<[u8; SETUP_LEN]> {
+        let mut bytes = [0; SETUP_LEN];
+        postcard::to_slice(self, &mut bytes).ok()?;
+        Some(bytes)
+    }
+
+    /// The setup in a record, or `None` if there is none.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; SETUP_LEN]) -> Option<Self> {
+        postcard::from_bytes(bytes).ok()
+    }
+
+    /// Sampling period, ns, for a clock that counts samples: both ends have the same one.
+    #[must_use]
+    pub fn period_ns(&self) -> u64 {
+        u64::from((self.config.period * 1e9 + 0.5) as u32)
+    }
+}
+
+/// Writes `part` at `at`; what does not fit is left out.
+fn put(bytes: &mut [u8], at: usize, part: &[u8]) {
+    for (place, byte) in bytes.iter_mut().skip(at).zip(part) {
+        *place = *byte;
+    }
+}

@@ -1,0 +1,129 @@
+//! What a law sees in one sample: the motion, and what kinematics and dynamics make of it.
+//!
+//! Both are worked out before the law is asked, whichever law that is. So a law is a few lines of algebra, and a sample
+//! takes as long with one as with another.
+
+use nalgebra::Vector4;
+
+use crate::mechanics::arm::Geometry;
+use crate::mechanics::body::{Body, MassMatrix};
+use crate::mechanics::jacobian::Jacobian;
+use crate::mechanics::kinematics::Trig;
+use crate::mechanics::math::wrap;
+use crate::trajectory::Reference;
+
+/// Everything that a law may use.
+#[derive(Clone, Copy, Debug)]
+pub struct Situation<'a> {
+    /// Motion in joint space, measured and wanted.
+    pub motion: &'a Motion<'a>,
+    /// The same in task space.
+    pub task: &'a Task,
+    /// The equations of motion at the measured position.
+    pub model: &'a Model,
+    /// Inertia of each axis by itself, for laws without a model.
+    pub nominal_inertia: &'a Vector4<f32>,
+}
+
+/// Motion in joint space.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion<'a> {
+    /// Measured joint positions.
+    pub q: Vector4<f32>,
+    /// Measured joint velocities: means over the last sample, so half a sample old.
+    pub qd: Vector4<f32>,
+    /// Measured joint torques, means over the last sample.
+    pub torque: Vector4<f32>,
+    /// Reference at the sampling instant.
+    pub reference: &'a Reference,
+    /// Reference velocity through the same filter as `qd`: compared with it without a delay.
+    pub mean_qd: Vector4<f32>,
+    /// Reference velocity at the middle of the time in which the command will act.
+    pub ahead_qd: Vector4<f32>,
+    /// Reference acceleration then.
+    pub ahead_qdd: Vector4<f32>,
+    /// Sampling period, s.
+    pub period: f32,
+    /// What the limits cut off the torques of the last sample, 0 where nothing.
+    pub excess: Vector4<f32>,
+}
+
+impl Motion<'_> {
+    /// Position error at the sampling instant.
+    pub fn position_error(&self) -> Vector4<f32> {
+        self.reference.q - self.q
+    }
+
+    /// Measured velocity, brought forward by what the reference gains in the meantime.
+    pub fn velocity_ahead(&self) -> Vector4<f32> {
+        self.qd + (self.ahead_qd - self.mean_qd)
+    }
+
+    /// Velocity error over the last sample.
+    pub fn velocity_error(&self) -> Vector4<f32> {
+        self.mean_qd - self.qd
+    }
+}
+
+/// Where the tool is not, and how fast it does not move: mu = (x, y, z, yaw).
+#[derive(Clone, Copy, Debug)]
+pub struct Task {
+    /// Jacobian at the reference.
+    pub desired: Jacobian,
+    /// Jacobian at the measured position.
+    pub actual: Jacobian,
+    /// mu_d - mu: m, m, m, rad (wrapped).
+    pub position: Vector4<f32>,
+    /// mu_d' - mu', means over the last sample.
+    pub velocity: Vector4<f32>,
+}
+
+impl Task {
+    /// Task space of an arm of this geometry whose measured position is that of `trig`.
+    pub fn new(geometry: &Geometry, trig: &Trig, motion: &Motion<'_>) -> Self {
+        let desired = Jacobian::new(geometry, &Trig::in_line(&motion.reference.q));
+        let actual = Jacobian::new(geometry, trig);
+        let ((x_desired, y_desired), (x, y)) = (desired.position(), actual.position());
+        // Height and yaw are linear in the joints: so are their errors.
+        let joint = motion.position_error();
+        Self {
+            position: Vector4::new(
+                x_desired - x,
+                y_desired - y,
+                -joint.z,
+                wrap(joint.x + joint.y - joint.w),
+            ),
+            velocity: desired.task_velocity(&motion.mean_qd) - actual.task_velocity(&motion.qd),
+            desired,
+            actual,
+        }
+    }
+}
+
+/// The terms of M(q) qdd + C qd + g + friction = tau in one sample: N m, N m, N, N m.
+#[derive(Clone, Copy, Debug)]
+pub struct Model {
+    /// M, rotors included.
+    pub mass: MassMatrix,
+    /// C qd at the velocity of the time in which the command will act.
+    pub bias: Vector4<f32>,
+    /// g.
+    pub gravity: Vector4<f32>,
+    /// Friction of the planned motion: that of the measured one would chatter around rest.
+    pub friction: Vector4<f32>,
+    /// C^T qd at the measured velocity: what the momentum gains besides the torques.
+    pub kinetic_gradient: Vector4<f32>,
+}
+
+impl Model {
+    /// The model at the position of `trig`.
+    pub fn new(body: &Body, trig: &Trig, motion: &Motion<'_>) -> Self {
+        Self {
+            mass: body.mass_matrix(trig),
+            bias: body.lagrange.bias(trig, &motion.velocity_ahead()),
+            gravity: body.lagrange.gravity(),
+            friction: body.drive.friction(&motion.ahead_qd),
+            kinetic_gradient: body.lagrange.kinetic_gradient(trig, &motion.qd),
+        }
+    }
+}

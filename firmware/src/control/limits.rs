@@ -1,0 +1,46 @@
+//! Torque limits: what a law asks for, cut to what joints and motors can give.
+//!
+//! Limited is not failed: a cut is a flag in the state message and holds the integrals, no more.
+
+use nalgebra::Vector4;
+
+use crate::mechanics::arm::ArmModel;
+use crate::mechanics::dynamics::drive::Drive;
+use crate::mechanics::math::clamp;
+
+/// Torques within every limit, and what that took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limited {
+    /// Motor torques, N m.
+    pub motor_torque: Vector4<f32>,
+    /// What was cut off, at the joint or else at the motor (N m, lift N): with the sign of the torque, 0 where
+    /// nothing was.
+    pub excess: Vector4<f32>,
+    /// Bit i: axis i was cut.
+    pub flags: u16,
+}
+
+/// Cuts joint torques (N m, lift N) to the limits of the joints, then of the motors.
+pub fn cut(arm: &ArmModel, drive: &Drive, torque: &Vector4<f32>) -> Limited {
+    let joint = torque.zip_map(&arm.limits.effort, within);
+    let wanted = drive.motor_torque(&joint);
+    let motor_torque = wanted.zip_map(&arm.drive.motor_torque_limit, within);
+    let excess = (torque - joint).zip_map(&(wanted - motor_torque), |joint, motor| {
+        if joint == 0.0 { motor } else { joint }
+    });
+    let flags = excess
+        .iter()
+        .zip([1u16, 2, 4, 8])
+        .filter(|(cut, _)| **cut != 0.0)
+        .fold(0, |flags, (_, bit)| flags | bit);
+    Limited {
+        motor_torque,
+        excess,
+        flags,
+    }
+}
+
+/// `torque` cut to a magnitude; a NaN stays one.
+fn within(torque: f32, limit: f32) -> f32 {
+    clamp(torque, -limit, limit)
+}

@@ -1,0 +1,107 @@
+//! The arm as the controller believes it to be: links, payload, rotors and friction together.
+
+use core::f32::consts::FRAC_PI_2;
+use core::ops::Mul;
+
+use nalgebra::{Matrix4, Vector4};
+
+use crate::mechanics::arm::{ArmModel, Payload};
+use crate::mechanics::dynamics::drive::Drive;
+use crate::mechanics::dynamics::lagrange::Lagrange;
+use crate::mechanics::kinematics::Trig;
+
+/// Everything that depends on the payload, lumped once so that a tick does not repeat it.
+#[derive(Clone, Copy, Debug)]
+pub struct Body {
+    /// Rigid links with payload.
+    pub lagrange: Lagrange,
+    /// Motors, gears, coupling and friction.
+    pub drive: Drive,
+    /// Rotor inertia seen at the joints, A^T Jm A.
+    rotor: Matrix4<f32>,
+    /// Inertia of each axis by itself at a square elbow: what laws without a model scale with.
+    pub nominal_inertia: Vector4<f32>,
+}
+
+impl Body {
+    /// The arm carrying `payload`.
+    pub fn new(arm: &ArmModel, payload: &Payload) -> Self {
+        let drive = Drive::new(&arm.drive);
+        let mut body = Self {
+            lagrange: Lagrange::new(arm, payload),
+            drive,
+            rotor: drive.rotor_inertia(),
+            nominal_inertia: Vector4::zeros(),
+        };
+        let square = Trig::new(&Vector4::new(0.0, FRAC_PI_2, 0.0, 0.0));
+        body.nominal_inertia = body.mass_matrix(&square).diagonal();
+        body
+    }
+
+    /// Inertia matrix at the joints, rotors included.
+    pub fn mass_matrix(&self, trig: &Trig) -> MassMatrix {
+        let links = self.lagrange.mass_matrix(trig);
+        MassMatrix {
+            m11: links.m11 + self.rotor.m11,
+            m12: links.m12,
+            m14: links.m14,
+            m22: links.m22 + self.rotor.m22,
+            m24: links.m24,
+            m33: links.m33 + self.rotor.m33,
+            m34: self.rotor.m34,
+            m44: links.m44 + self.rotor.m44,
+        }
+    }
+
+    /// [`Body::mass_matrix`] times `qdd`, in less than making the matrix takes.
+    pub fn inertial(&self, trig: &Trig, qdd: &Vector4<f32>) -> Vector4<f32> {
+        let mut torque = self.lagrange.inertial(trig, qdd);
+        torque.x += self.rotor.m11 * qdd.x;
+        torque.y += self.rotor.m22 * qdd.y;
+        torque.z += self.rotor.m33 * qdd.z + self.rotor.m34 * qdd.w;
+        torque.w += self.rotor.m43 * qdd.z + self.rotor.m44 * qdd.w;
+        torque
+    }
+
+    /// Joint torque (N m, N m, N, N m) for a motion: links, rotors and friction.
+    pub fn inverse(&self, trig: &Trig, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
+        self.inertial(trig, qdd)
+            + self.lagrange.bias(trig, qd)
+            + self.lagrange.gravity()
+            + self.drive.friction(qd)
+    }
+}
+
+/// The inertia matrix of a SCARA, symmetric and half empty: links couple the three turning axes, rotors lift and wrist.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct MassMatrix {
+    pub m11: f32,
+    pub m12: f32,
+    pub m14: f32,
+    pub m22: f32,
+    pub m24: f32,
+    pub m33: f32,
+    pub m34: f32,
+    pub m44: f32,
+}
+
+impl MassMatrix {
+    /// Inertia of each axis by itself.
+    pub fn diagonal(&self) -> Vector4<f32> {
+        Vector4::new(self.m11, self.m22, self.m33, self.m44)
+    }
+}
+
+impl Mul<&Vector4<f32>> for &MassMatrix {
+    type Output = Vector4<f32>;
+
+    fn mul(self, v: &Vector4<f32>) -> Vector4<f32> {
+        Vector4::new(
+            self.m11 * v.x + self.m12 * v.y + self.m14 * v.w,
+            self.m12 * v.x + self.m22 * v.y + self.m24 * v.w,
+            self.m33 * v.z + self.m34 * v.w,
+            self.m14 * v.x + self.m24 * v.y + self.m34 * v.z + self.m44 * v.w,
+        )
+    }
+}

@@ -1,0 +1,205 @@
+//! Inverse kinematics: the joint position that puts the flange at a pose.
+
+use core::f32::consts::TAU;
+use core::fmt;
+
+use nalgebra::Vector4;
+
+use super::Pose;
+use crate::mechanics::arm::{ArmModel, Axis, Geometry, JointLimits};
+use crate::mechanics::math::{atan2, clamp, hypot, sin_cos, sqrt, wrap};
+
+/// How far out of reach a radius may be, as a fraction of the stretched arm, and still count as the boundary: 8 u, half a
+/// micrometre on a metre.
+///
+/// A pose that the forward kinematics gives for a stretched arm may be that far out: 3.5 u (the errors of sine and
+/// cosine together), 2 u of rounding in the coordinates and 2 u in the radius.
+pub const REACH_TOLERANCE: f32 = 4.0 * f32::EPSILON;
+
+/// How far past a limit a solution may be, as a fraction of the range of the axis, and still be put on the limit: 16 u
+/// (5e-6 rad of a shoulder that turns +-150 degrees), so that the pose of an arm that stands on a limit has a solution.
+///
+/// It covers, for the shoulder, two arc tangents at 4 u of at most pi, their difference and its wrap, and the rounding of
+/// the pose seen from the shoulder. It does not cover the ill-conditioned posture next to the stretched arm.
+pub const LIMIT_TOLERANCE: f32 = 8.0 * f32::EPSILON;
+
+/// Which way the elbow bends: the two postures that reach one pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Elbow {
+    /// theta2 >= 0.
+    Positive,
+    /// theta2 <= 0.
+    Negative,
+}
+
+impl Elbow {
+    /// The posture of an arm at joint position `q`; positive for the stretched arm.
+    #[must_use]
+    pub fn of(q: &Vector4<f32>) -> Self {
+        if q.y < 0.0 {
+            Self::Negative
+        } else {
+            Self::Positive
+        }
+    }
+}
+
+/// Why a pose has no joint position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum IkError {
+    /// The pose or the position to stay near holds an infinity or NaN.
+    NotFinite,
+    /// Farther out than the stretched arm.
+    TooFar {
+        /// Distance from the shoulder axis (m).
+        radius: f32,
+        /// Greatest distance in reach (m).
+        max: f32,
+    },
+    /// Closer in than the folded arm.
+    TooNear {
+        /// Distance from the shoulder axis (m).
+        radius: f32,
+        /// Least distance in reach (m).
+        min: f32,
+    },
+    /// The arm reaches it, but an axis would pass its limit.
+    Limit {
+        /// The first such axis.
+        axis: Axis,
+        /// Where it would have to go (rad, lift m).
+        value: f32,
+        /// The limit it would pass.
+        limit: f32,
+    },
+}
+
+impl fmt::Display for IkError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite => write!(f, "pose or present position is not finite"),
+            Self::TooFar { radius, max } => write!(
+                f,
+                "{radius} m from the shoulder axis, at most {max} m in reach"
+            ),
+            Self::TooNear { radius, min } => write!(
+                f,
+                "{radius} m from the shoulder axis, at least {min} m in reach"
+            ),
+            Self::Limit { axis, value, limit } => write!(
+                f,
+                "{axis:?} axis would go to {value}, past its limit {limit}"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for IkError {}
+
+/// Joint position for `pose` by geometry alone: no joint limits, theta1 and theta4 in (-pi, pi].
+///
+/// The half-angle form `tan(theta2 / 2) = sqrt((S^2 - r^2) / (r^2 - D^2))`, with S and D the sum and difference of the
+/// arm lengths, replaces the paper's `cos theta2`, which loses half the digits near the stretched arm. What conditioning remains
+/// is that of the pose itself: a radius off by e moves theta2 by `r e / (a1 a2 sin theta2)`, at most `sqrt(2 r e / (a1
+/// a2))` at full stretch, while the pose it leads to is off by no more than e. The paper's arc tangents have their
+/// arguments in the order (x, y) and its d3 has the wrong sign; both are put right here.
+///
+/// # Errors
+///
+/// [`IkError::NotFinite`], [`IkError::TooFar`], [`IkError::TooNear`]. A radius out of reach by at most
+/// [`REACH_TOLERANCE`] is taken for the boundary.
+pub fn solve(geometry: &Geometry, pose: &Pose, elbow: Elbow) -> Result<Vector4<f32>, IkError> {
+    let Pose { x, y, z, yaw } = *pose;
+    if ![x, y, z, yaw].into_iter().all(f32::is_finite) {
+        return Err(IkError::NotFinite);
+    }
+
+    let radius = hypot(x, y);
+    let max = geometry.reach();
+    let min = (geometry.a1 - geometry.a2).abs();
+    let tolerance = REACH_TOLERANCE * max;
+    if radius > max + tolerance {
+        return Err(IkError::TooFar { radius, max });
+    }
+    if radius < min - tolerance {
+        return Err(IkError::TooNear { radius, min });
+    }
+    // The tolerance may leave either distance below zero.
+    let short_of_stretched = clamp(max - radius, 0.0, max);
+    let short_of_folded = clamp(radius - min, 0.0, max);
+
+    let bend = 2.0
+        * atan2(
+            sqrt(short_of_stretched * (max + radius)),
+            sqrt(short_of_folded * (radius + min)),
+        );
+    let theta2 = match elbow {
+        Elbow::Positive => bend,
+        Elbow::Negative => -bend,
+    };
+    let (s2, c2) = sin_cos(theta2);
+    let theta1 = wrap(atan2(y, x) - atan2(geometry.a2 * s2, geometry.a1 + geometry.a2 * c2));
+    let theta4 = wrap(theta1 + theta2 - yaw);
+    Ok(Vector4::new(
+        theta1,
+        theta2,
+        geometry.d1 - geometry.d4 - z,
+        theta4,
+    ))
+}
+
+/// Joint position for `pose` within the limits of `arm`, with the wrist on the turn nearest to that of `near`.
+///
+/// # Errors
+///
+/// Those of [`solve`], and [`IkError::Limit`] for the first axis that would pass a limit by more than [`LIMIT_TOLERANCE`].
+pub fn inverse(
+    arm: &ArmModel,
+    pose: &Pose,
+    elbow: Elbow,
+    near: &Vector4<f32>,
+) -> Result<Vector4<f32>, IkError> {
+    if !near.w.is_finite() {
+        return Err(IkError::NotFinite);
+    }
+    let mut q = solve(&arm.geometry, pose, elbow)?;
+    q.w = nearest_turn(q.w, near.w, arm.limits.lower.w, arm.limits.upper.w);
+    within_limits(&q, &arm.limits)
+}
+
+/// The angle plus whole turns that is nearest to `near` inside the limits; outside them if no turn is inside.
+fn nearest_turn(angle: f32, near: f32, lower: f32, upper: f32) -> f32 {
+    let near = clamp(near, lower, upper);
+    let nearest = near + wrap(angle - near);
+    let slack = LIMIT_TOLERANCE * (upper - lower);
+    if nearest > upper + slack {
+        nearest - TAU
+    } else if nearest < lower - slack {
+        nearest + TAU
+    } else {
+        nearest
+    }
+}
+
+/// `q` with each value that passes a limit by rounding alone put on it.
+fn within_limits(q: &Vector4<f32>, limits: &JointLimits) -> Result<Vector4<f32>, IkError> {
+    for axis in Axis::ALL {
+        let (value, lower, upper) = (axis.of(q), axis.of(&limits.lower), axis.of(&limits.upper));
+        let slack = LIMIT_TOLERANCE * (upper - lower);
+        if value < lower - slack {
+            return Err(IkError::Limit {
+                axis,
+                value,
+                limit: lower,
+            });
+        }
+        if value > upper + slack {
+            return Err(IkError::Limit {
+                axis,
+                value,
+                limit: upper,
+            });
+        }
+    }
+    Ok(q.zip_zip_map(&limits.lower, &limits.upper, clamp))
+}

@@ -1,0 +1,342 @@
+//! A CAN bus in the bench: bit-timed, with arbitration, deterministic.
+//!
+//! Time is an argument, in ns from any origin. The bus never runs by itself: the caller puts frames in with
+//! [`BuiltinBus::enqueue`], asks with [`BuiltinBus::next_event`] when something happens, and takes what was received
+//! with [`BuiltinBus::pop_delivery`].
+//!
+//! What is modelled: exact frame lengths, arbitration bit by bit, non-preemption, interframe space, transmit mailboxes,
+//! identifier collisions. What is not: propagation delay, oscillator tolerance, error frames of other causes and error
+//! counters; faults are injected by wrappers around a node's [`Bus`](protocol::bus::Bus).
+
+mod load;
+
+use std::collections::BTreeMap;
+
+use protocol::bus::TransmitError;
+use protocol::frame::{CanFrame, Id};
+use protocol::wire::{BitTiming, FrameBits, arbitration_field};
+
+pub use load::{MAX_LOAD, Overload, Traffic, admit, worst_case_load};
+
+/// What an identifier collision costs beyond the frames themselves: superposed error flags (6 to 12 bits) and error
+/// delimiter (8).
+const ERROR_FRAME: FrameBits = FrameBits {
+    nominal: 12 + 8,
+    data: 0,
+};
+
+/// A node of one bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeId(usize);
+
+/// Some nodes of one bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodeSet(u64);
+
+impl NodeSet {
+    /// Whether the node is one of them.
+    #[must_use]
+    pub fn contains(self, node: NodeId) -> bool {
+        self.0 & 1 << node.0 != 0
+    }
+
+    /// The nodes, in the order they were attached.
+    pub fn iter(self) -> impl Iterator<Item = NodeId> {
+        (0..BuiltinBus::MAX_NODES)
+            .map(NodeId)
+            .filter(move |&node| self.contains(node))
+    }
+
+    fn insert(&mut self, node: usize) {
+        self.0 |= 1 << node;
+    }
+}
+
+/// A frame that arrived at every node but its sender.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Delivery {
+    /// When receivers took it as valid, ns: sample point of the last but one bit of end of frame.
+    pub time: u64,
+    /// When its start of frame began, ns.
+    pub start: u64,
+    /// The frame.
+    pub frame: CanFrame,
+    /// The sender; several when nodes sent the very same frame at the same instant, which CAN merges into one.
+    pub from: NodeSet,
+}
+
+/// Nodes that started different frames with one identifier at the same instant.
+///
+/// Arbitration cannot separate them, a bit error follows. Real controllers repeat both frames, and collide, until both
+/// are bus-off; here both frames are lost at once. Two nodes with one identifier are an error of configuration, never a
+/// state to run in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Collision {
+    /// When the frames started, ns.
+    pub start: u64,
+    /// Their identifier.
+    pub id: Id,
+    /// The nodes that sent them.
+    pub nodes: NodeSet,
+}
+
+/// What the bus carried of one identifier, or of all.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Carried {
+    /// Frames received.
+    pub frames: u64,
+    /// Time they took, interframe space included, ns.
+    pub busy: u64,
+    /// Longest that one waited from [`BuiltinBus::enqueue`] to its start of frame, ns.
+    pub max_wait: u64,
+}
+
+impl Carried {
+    /// Share of `elapsed` ns that the bus was taken, of 1.
+    #[must_use]
+    pub fn load(&self, elapsed: u64) -> f64 {
+        self.busy as f64 / elapsed.max(1) as f64
+    }
+
+    fn add(&mut self, busy: u64, wait: u64) {
+        self.frames += 1;
+        self.busy += busy;
+        self.max_wait = self.max_wait.max(wait);
+    }
+}
+
+/// What happened on the bus since it was made.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// All frames together.
+    pub total: Carried,
+    /// By identifier, in the order of arbitration.
+    pub by_id: BTreeMap<Id, Carried>,
+    /// Frames refused because every mailbox of their node was occupied.
+    pub refused: u64,
+    /// Identifier collisions.
+    pub collisions: u64,
+    /// The first of them.
+    pub first_collision: Option<Collision>,
+}
+
+/// Frame in a transmit mailbox.
+struct Mailbox {
+    arbitration: u32,
+    frame: CanFrame,
+    queued: u64,
+    duration: u64,
+}
+
+/// A node's CAN controller, as the bus sees it.
+struct Node {
+    capacity: usize,
+    /// In the order they were filled.
+    mailboxes: Vec<Mailbox>,
+}
+
+impl Node {
+    /// The mailbox that takes part in an arbitration at `start`: highest priority first, oldest of one identifier.
+    fn candidate(&self, start: u64) -> Option<(usize, &Mailbox)> {
+        self.mailboxes
+            .iter()
+            .enumerate()
+            .filter(|(_, mailbox)| mailbox.queued <= start)
+            .min_by_key(|(_, mailbox)| mailbox.arbitration)
+    }
+}
+
+/// The next transmission, as far as it is known.
+struct Transmission {
+    start: u64,
+    valid: u64,
+    idle: u64,
+    from: NodeSet,
+    collides: bool,
+}
+
+/// The bus and the transmit side of its nodes' controllers.
+///
+/// A controller sends its mailboxes in the order of their priority (as bxCAN by default, M_CAN in queue mode), frames of
+/// one identifier in the order they came: a FIFO would let a heartbeat delay a command. A mailbox is free again when its
+/// frame is valid for the receivers.
+pub struct BuiltinBus {
+    timing: BitTiming,
+    nodes: Vec<Node>,
+    /// End of the last intermission: no frame starts before.
+    idle: u64,
+    statistics: Statistics,
+}
+
+impl BuiltinBus {
+    /// Most nodes of one bus.
+    pub const MAX_NODES: usize = u64::BITS as usize;
+
+    /// An idle bus without nodes.
+    #[must_use]
+    pub fn new(timing: BitTiming) -> Self {
+        Self {
+            timing,
+            nodes: Vec::new(),
+            idle: 0,
+            statistics: Statistics::default(),
+        }
+    }
+
+    /// Adds a node whose controller has `mailboxes` transmit mailboxes.
+    ///
+    /// # Panics
+    /// Above [`Self::MAX_NODES`] nodes.
+    pub fn attach(&mut self, mailboxes: usize) -> NodeId {
+        assert!(
+            self.nodes.len() < Self::MAX_NODES,
+            "a bus has at most {} nodes",
+            Self::MAX_NODES
+        );
+        self.nodes.push(Node {
+            capacity: mailboxes,
+            mailboxes: Vec::with_capacity(mailboxes),
+        });
+        NodeId(self.nodes.len() - 1)
+    }
+
+    /// Puts a frame into a mailbox of `node` at `now`.
+    ///
+    /// `now` is not earlier than the last delivery taken, and deliveries up to `now` have been taken: only that frees
+    /// their mailboxes. A frame put in at the very instant another starts takes part in the arbitration; later, it waits.
+    ///
+    /// # Errors
+    /// [`TransmitError::QueueFull`] when every mailbox is occupied; the frame is lost and counted.
+    ///
+    /// # Panics
+    /// With a node of another bus.
+    pub fn enqueue(
+        &mut self,
+        node: NodeId,
+        now: u64,
+        frame: &CanFrame,
+    ) -> Result<(), TransmitError> {
+        let node = &mut self.nodes[node.0];
+        if node.mailboxes.len() == node.capacity {
+            self.statistics.refused += 1;
+            return Err(TransmitError::QueueFull);
+        }
+        node.mailboxes.push(Mailbox {
+            arbitration: arbitration_field(frame).0,
+            frame: *frame,
+            queued: now,
+            duration: self.timing.duration(FrameBits::exact(frame)),
+        });
+        Ok(())
+    }
+
+    /// When the transmission that is under way or comes next ends, ns, unless frames put in by then win over it; `None`
+    /// when nothing is to be sent.
+    #[must_use]
+    pub fn next_event(&self) -> Option<u64> {
+        self.next_transmission().map(|next| next.valid)
+    }
+
+    /// The oldest frame received at or before `until` and not yet taken.
+    ///
+    /// The caller says with it that nothing more is put in before `until`.
+    pub fn pop_delivery(&mut self, until: u64) -> Option<Delivery> {
+        // Every round empties a mailbox.
+        loop {
+            let next = self.next_transmission()?;
+            if next.valid > until {
+                return None;
+            }
+            if let Some(delivery) = self.complete(&next) {
+                return Some(delivery);
+            }
+        }
+    }
+
+    /// What happened so far. A frame counts when it is taken.
+    #[must_use]
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// Arbitration among the frames known by now.
+    ///
+    /// There is no state of a frame under way: frames put in after its start are no candidates, so the answer stays the
+    /// same until it is complete.
+    fn next_transmission(&self) -> Option<Transmission> {
+        let oldest = self
+            .nodes
+            .iter()
+            .flat_map(|node| &node.mailboxes)
+            .map(|mailbox| mailbox.queued)
+            .min()?;
+        let start = oldest.max(self.idle);
+        let candidates = || {
+            self.nodes
+                .iter()
+                .enumerate()
+                .filter_map(|(index, node)| Some((index, node.candidate(start)?.1)))
+        };
+        let (_, winner) = candidates().min_by_key(|(_, mailbox)| mailbox.arbitration)?;
+
+        let mut from = NodeSet::default();
+        let mut collides = false;
+        let mut duration = 0;
+        for (index, mailbox) in
+            candidates().filter(|(_, mailbox)| mailbox.arbitration == winner.arbitration)
+        {
+            from.insert(index);
+            collides |= mailbox.frame != winner.frame;
+            duration = duration.max(mailbox.duration);
+        }
+        if collides {
+            // An upper bound: the longest frame in full, as if the last bit were the first to differ.
+            duration += self.timing.duration(ERROR_FRAME);
+        }
+        let idle = start + duration;
+        Some(Transmission {
+            start,
+            valid: idle - self.timing.after_valid(),
+            idle,
+            from,
+            collides,
+        })
+    }
+
+    /// Empties the senders' mailboxes and keeps the books; the frame, unless it collided.
+    fn complete(&mut self, sent: &Transmission) -> Option<Delivery> {
+        self.idle = sent.idle;
+        let mut frame = None;
+        let mut wait = 0;
+        for NodeId(index) in sent.from.iter() {
+            let node = &mut self.nodes[index];
+            let (mailbox, _) = node.candidate(sent.start)?;
+            let mailbox = node.mailboxes.remove(mailbox);
+            wait = wait.max(sent.start - mailbox.queued);
+            frame = Some(mailbox.frame);
+        }
+        let frame = frame?;
+        if sent.collides {
+            self.statistics.collisions += 1;
+            self.statistics.first_collision.get_or_insert(Collision {
+                start: sent.start,
+                id: frame.id(),
+                nodes: sent.from,
+            });
+            return None;
+        }
+        let busy = sent.idle - sent.start;
+        self.statistics.total.add(busy, wait);
+        self.statistics
+            .by_id
+            .entry(frame.id())
+            .or_default()
+            .add(busy, wait);
+        Some(Delivery {
+            time: sent.valid,
+            start: sent.start,
+            frame,
+            from: sent.from,
+        })
+    }
+}

@@ -1,0 +1,18 @@
+//! Simulated robot cell: plant, drives, bit-timed CAN bus, operator and controller in lock-step.
+
+#![forbid(unsafe_code)]
+
+pub mod bus;
+mod convert;
+pub mod drives;
+pub mod endpoint;
+pub mod metrics;
+pub mod model;
+pub mod operator;
+pub mod plant;
+pub mod rig;
+pub mod run;
+pub mod scenario;
+pub mod selection;
+pub mod setup;
+pub mod summary;

@@ -1,0 +1,312 @@
+//! Reading checked values out of JSON text, with the place of everything that is wrong.
+//!
+//! `serde_json` knows lines only while it parses; a missing key or a mass of zero is noticed later. The reader
+//! therefore keeps the path of every value it hands out and looks its line up when, and only when, it must complain.
+
+use super::{ModelError, ModelErrorKind};
+use serde_json::Value;
+use std::fmt;
+
+/// What a number may be.
+#[derive(Clone, Copy)]
+pub(super) enum Allowed {
+    Finite,
+    Positive,
+    NotNegative,
+}
+
+impl Allowed {
+    fn admits(self, number: f64) -> bool {
+        number.is_finite()
+            && match self {
+                Self::Finite => true,
+                Self::Positive => number > 0.0,
+                Self::NotNegative => number >= 0.0,
+            }
+    }
+}
+
+impl fmt::Display for Allowed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Finite => "a finite number",
+            Self::Positive => "a number > 0",
+            Self::NotNegative => "a number >= 0",
+        })
+    }
+}
+
+#[derive(Clone)]
+enum Segment {
+    Key(String),
+    Index(usize),
+}
+
+/// A value inside a document, together with where it stands.
+#[derive(Clone)]
+pub(super) struct Node<'a> {
+    text: &'a str,
+    value: &'a Value,
+    path: Vec<Segment>,
+}
+
+/// Parses `text`; a syntax error names its line.
+pub(super) fn parse(text: &str) -> Result<Value, ModelError> {
+    serde_json::from_str(text).map_err(|error| ModelError {
+        line: Some(error.line()),
+        cause: ModelErrorKind::Syntax(error.to_string()),
+    })
+}
+
+impl<'a> Node<'a> {
+    pub(super) fn root(text: &'a str, value: &'a Value) -> Self {
+        Self {
+            text,
+            value,
+            path: Vec::new(),
+        }
+    }
+
+    /// The value under `key`, or `None`. A node that is not an object has no keys.
+    pub(super) fn optional(&self, key: &str) -> Option<Node<'a>> {
+        self.value
+            .get(key)
+            .map(|value| self.child(value, Segment::Key(key.to_owned())))
+    }
+
+    /// The value under `key`; `expected` says what belongs there.
+    pub(super) fn get(
+        &self,
+        key: &str,
+        expected: impl fmt::Display,
+    ) -> Result<Node<'a>, ModelError> {
+        if !self.value.is_object() {
+            return Err(self.wrong("a JSON object"));
+        }
+        self.optional(key).ok_or_else(|| {
+            let mut path = self.path.clone();
+            path.push(Segment::Key(key.to_owned()));
+            let cause = ModelErrorKind::Missing {
+                path: display(&path),
+                expected: expected.to_string(),
+            };
+            ModelError {
+                line: Some(line_of(self.text, &self.path)),
+                cause,
+            }
+        })
+    }
+
+    /// The elements of an array of exactly `N`.
+    pub(super) fn elements<const N: usize>(
+        &self,
+        of: impl fmt::Display,
+    ) -> Result<[Node<'a>; N], ModelError> {
+        let nodes: Option<Vec<_>> = self.value.as_array().map(|values| {
+            values
+                .iter()
+                .enumerate()
+                .map(|(i, value)| self.child(value, Segment::Index(i)))
+                .collect()
+        });
+        nodes
+            .and_then(|nodes| nodes.try_into().ok())
+            .ok_or_else(|| self.wrong(format!("an array of {N}: {of}")))
+    }
+
+    /// This value as a number.
+    pub(super) fn as_number(&self, allowed: Allowed) -> Result<f64, ModelError> {
+        self.value
+            .as_f64()
+            .filter(|&x| allowed.admits(x))
+            .ok_or_else(|| self.wrong(allowed))
+    }
+
+    pub(super) fn number(&self, key: &str, allowed: Allowed) -> Result<f64, ModelError> {
+        self.get(key, allowed)?.as_number(allowed)
+    }
+
+    pub(super) fn numbers<const N: usize>(
+        &self,
+        key: &str,
+        allowed: Allowed,
+    ) -> Result<[f64; N], ModelError> {
+        self.get(key, format!("an array of {N}: {allowed}"))?
+            .as_numbers(allowed)
+    }
+
+    pub(super) fn as_numbers<const N: usize>(
+        &self,
+        allowed: Allowed,
+    ) -> Result<[f64; N], ModelError> {
+        let nodes = self.elements::<N>(allowed)?;
+        let mut numbers = [0.0; N];
+        for (number, node) in numbers.iter_mut().zip(&nodes) {
+            *number = node.as_number(allowed)?;
+        }
+        Ok(numbers)
+    }
+
+    pub(super) fn string(&self, key: &str) -> Result<&'a str, ModelError> {
+        let node = self.get(key, "a string")?;
+        node.value.as_str().ok_or_else(|| node.wrong("a string"))
+    }
+
+    /// The error that this value is not what it must be.
+    pub(super) fn wrong(&self, expected: impl fmt::Display) -> ModelError {
+        let found = match self.value {
+            Value::Array(values) => format!("an array of {}", values.len()),
+            Value::Object(_) => "an object".to_owned(),
+            scalar => scalar.to_string(),
+        };
+        let cause = ModelErrorKind::Wrong {
+            path: display(&self.path),
+            found,
+            expected: expected.to_string(),
+        };
+        ModelError {
+            line: Some(self.line()),
+            cause,
+        }
+    }
+
+    /// Line of this value, counted from 1.
+    pub(super) fn line(&self) -> usize {
+        line_of(self.text, &self.path)
+    }
+
+    /// Path of this value, as in `links[2].mass`.
+    pub(super) fn path(&self) -> String {
+        display(&self.path)
+    }
+
+    fn child(&self, value: &'a Value, segment: Segment) -> Self {
+        let mut path = self.path.clone();
+        path.push(segment);
+        Self {
+            text: self.text,
+            value,
+            path,
+        }
+    }
+}
+
+fn display(path: &[Segment]) -> String {
+    let mut text = String::new();
+    for segment in path {
+        match segment {
+            Segment::Key(key) if text.is_empty() => text.push_str(key),
+            Segment::Key(key) => text.extend([".", key]),
+            Segment::Index(index) => text.push_str(&format!("[{index}]")),
+        }
+    }
+    if text.is_empty() {
+        "the document".to_owned()
+    } else {
+        text
+    }
+}
+
+fn line_of(text: &str, path: &[Segment]) -> usize {
+    let mut cursor = Cursor {
+        bytes: text.as_bytes(),
+        at: 0,
+    };
+    cursor.skip_space();
+    for segment in path {
+        cursor.enter(segment);
+    }
+    1 + text.as_bytes()[..cursor.at]
+        .iter()
+        .filter(|&&byte| byte == b'\n')
+        .count()
+}
+
+/// Walks text that is known to be valid JSON.
+struct Cursor<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Cursor<'a> {
+    fn peek(&self) -> u8 {
+        self.bytes.get(self.at).copied().unwrap_or(b'}')
+    }
+
+    fn skip_space(&mut self) {
+        while self.peek().is_ascii_whitespace() {
+            self.at += 1;
+        }
+    }
+
+    /// Moves from the start of a container to the start of one of its values. A key that occurs twice means its last
+    /// occurrence, as it does for the parser.
+    fn enter(&mut self, segment: &Segment) {
+        let keyed = self.peek() == b'{';
+        let mut found = self.at;
+        self.at += 1;
+        self.skip_space();
+        for index in 0.. {
+            if matches!(self.peek(), b'}' | b']') {
+                break;
+            }
+            let mut key: &[u8] = &[];
+            if keyed {
+                key = self.string();
+                self.skip_space();
+                self.at += 1; // ':'
+                self.skip_space();
+            }
+            match segment {
+                Segment::Key(wanted) if wanted.as_bytes() == key => found = self.at,
+                Segment::Index(wanted) if *wanted == index => found = self.at,
+                _ => {}
+            }
+            self.value();
+            self.skip_space();
+            if self.peek() == b',' {
+                self.at += 1;
+                self.skip_space();
+            }
+        }
+        self.at = found;
+    }
+
+    fn string(&mut self) -> &'a [u8] {
+        let start = self.at + 1;
+        self.at = start;
+        while self.at < self.bytes.len() && self.peek() != b'"' {
+            self.at += if self.peek() == b'\\' { 2 } else { 1 };
+        }
+        let end = self.at.min(self.bytes.len());
+        self.at += 1;
+        &self.bytes[start..end]
+    }
+
+    fn value(&mut self) {
+        let mut depth = 0;
+        while self.at < self.bytes.len() {
+            match self.peek() {
+                b'"' => {
+                    self.string();
+                    if depth == 0 {
+                        return;
+                    }
+                    continue;
+                }
+                b'{' | b'[' => depth += 1,
+                b'}' | b']' if depth == 0 => return,
+                b'}' | b']' => {
+                    depth -= 1;
+                    if depth == 0 {
+                        self.at += 1;
+                        return;
+                    }
+                }
+                b',' if depth == 0 => return,
+                _ => {}
+            }
+            self.at += 1;
+        }
+    }
+}

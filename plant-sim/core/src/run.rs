@@ -1,0 +1,55 @@
+//! One run, from configuration to summary, with no file, clock or print: what is kept of it is the observer's business.
+
+use std::io;
+
+use firmware::control::controller::Config;
+
+use crate::endpoint::{Endpoint, EndpointError, InProcess};
+use crate::operator::Operator;
+use crate::rig::{Observer, Rig, RunError};
+use crate::setup::{RunConfig, SetupError};
+use crate::summary::{Collector, Summary};
+
+/// Why there is no summary.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The run cannot begin.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// The controller could not be started.
+    #[error(transparent)]
+    Controller(#[from] EndpointError),
+    /// An observer could not keep what it was shown.
+    #[error("cannot write results: {0}")]
+    Output(io::Error),
+}
+
+/// Runs a scenario with the controller in this process.
+///
+/// A scenario that could not be completed still has a summary, with `completed` false and the reason in `error`.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn in_process<O: Observer>(config: &RunConfig, observer: &mut O) -> Result<Summary, Failure> {
+    with_controller(config, |config| Ok(InProcess::new(config)), observer)
+}
+
+/// Runs a scenario with the controller that `connect` starts.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn with_controller<E: Endpoint, O: Observer>(
+    config: &RunConfig,
+    connect: impl FnOnce(Config) -> Result<E, EndpointError>,
+    observer: &mut O,
+) -> Result<Summary, Failure> {
+    let rig = config.rig()?;
+    let controller = connect(rig.controller())?;
+    let mut rig = Rig::new(&rig, controller);
+    let mut operator = Operator::new(&config.scenario);
+    let mut observers = (Collector::new(config), observer);
+    match rig.run(&mut operator, &mut observers) {
+        Err(RunError::Output(source)) => Err(Failure::Output(source)),
+        result => Ok(observers.0.finish(config, &rig, &result)),
+    }
+}

@@ -1,0 +1,139 @@
+//! From a scenario and two robots to a rig: what is to run with what, checked.
+
+use firmware::mechanics::arm::{self, ArmModel};
+use protocol::wire::BitTiming;
+
+use crate::bus::Overload;
+use crate::model::RobotModel;
+use crate::plant::arm::Arm;
+use crate::plant::kinematics::{Pose, inverse};
+use crate::rig::{self, RigConfig};
+use crate::scenario::{Scenario, Step};
+
+/// What to run with what.
+#[derive(Clone, Debug)]
+pub struct RunConfig {
+    /// Motion, law, payload, mismatch.
+    pub scenario: Scenario,
+    /// The robot as the controller knows it.
+    pub nominal: RobotModel,
+    /// The robot as it is, before the scenario's mismatch.
+    pub actual: RobotModel,
+}
+
+/// Why a run cannot begin.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupError {
+    /// The start of the scenario is outside the robot's workspace.
+    #[error(
+        "scenario {scenario}: the start pose x {x}, y {y}, z {z}, yaw {yaw} is outside the workspace of {robot}"
+    )]
+    Start {
+        /// Scenario.
+        scenario: String,
+        /// Robot.
+        robot: String,
+        /// Pose.
+        x: f64,
+        /// Pose.
+        y: f64,
+        /// Pose.
+        z: f64,
+        /// Pose.
+        yaw: f64,
+    },
+    /// The controller cannot work with the model.
+    #[error("model {robot}: {source}")]
+    Model {
+        /// Robot.
+        robot: String,
+        /// Reason.
+        source: arm::ModelError,
+    },
+    /// The bus cannot carry the messages at this rate.
+    #[error("at {rate_hz} Hz the {source}; lower the rate")]
+    Link {
+        /// Control rate.
+        rate_hz: f64,
+        /// Load.
+        source: Overload,
+    },
+}
+
+impl RunConfig {
+    /// This scenario with the default robot, known as it is.
+    pub fn new(scenario: Scenario) -> Self {
+        Self {
+            scenario,
+            nominal: RobotModel::irb_930_22_105(),
+            actual: RobotModel::irb_930_22_105(),
+        }
+    }
+
+    /// The rig that the run needs.
+    ///
+    /// # Errors
+    /// The robot cannot start there, the controller not work with it, or the bus not carry the messages.
+    pub fn rig(&self) -> Result<RigConfig, SetupError> {
+        let scenario = &self.scenario;
+        let nominal = ArmModel::from(&self.nominal);
+        nominal.validate().map_err(|source| SetupError::Model {
+            robot: self.nominal.name.clone(),
+            source,
+        })?;
+        let mut actual = self.actual.clone();
+        for axis in 0..4 {
+            actual.drive.viscous[axis] *= scenario.mismatch.friction;
+            actual.drive.coulomb[axis] *= scenario.mismatch.friction;
+        }
+        let rig = RigConfig {
+            start: start(scenario, &actual)?,
+            actual,
+            nominal,
+            rate_hz: scenario.rate_hz,
+            timing: BitTiming::default(),
+        };
+        rig::admit(&rig.timing, rig.rate_hz).map_err(|source| SetupError::Link {
+            rate_hz: rig.rate_hz,
+            source,
+        })?;
+        Ok(rig)
+    }
+
+    /// Where the tool stands when a cycle has ended: x, y, z in frame 0, m.
+    pub fn cycle_target(&self) -> [f64; 3] {
+        let last = self
+            .scenario
+            .cycle
+            .iter()
+            .rev()
+            .find_map(|step| match step {
+                Step::Jump(jump) => Some(jump.to),
+                Step::Line(line) => Some(line.to),
+                Step::Joints(joints) => {
+                    let arm = Arm::new(&self.actual, None);
+                    let pose = arm.pose(&arm.at(&joints.to.into()));
+                    Some([pose.x, pose.y, pose.z, pose.yaw])
+                }
+                Step::Dwell(_) | Step::Stop(_) | Step::Pick(_) | Step::Place {} => None,
+            });
+        let [x, y, z, _] = last.unwrap_or(self.scenario.start);
+        [x, y, z]
+    }
+}
+
+fn start(scenario: &Scenario, robot: &RobotModel) -> Result<[f64; 4], SetupError> {
+    let [x, y, z, yaw] = scenario.start;
+    inverse(&robot.geometry, &robot.limits, &Pose { x, y, z, yaw })
+        .ok()
+        .filter(|[positive, _]| positive.violation.is_none())
+        .map(|[positive, _]| positive.q.into())
+        .ok_or_else(|| SetupError::Start {
+            scenario: scenario.name.clone(),
+            robot: robot.name.clone(),
+            x,
+            y,
+            z,
+            yaw,
+        })
+}

@@ -1,0 +1,181 @@
+//! What a run is judged by, gathered while it goes.
+
+use std::io;
+
+use protocol::codec;
+use protocol::frame::CanFrame;
+use protocol::messages::{Message, Node};
+use protocol::schema::Content;
+use protocol::table;
+use serde::Serialize;
+
+use crate::endpoint::Endpoint;
+use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
+use crate::operator::Hand;
+use crate::rig::{Observer, Rig, RunError, Truth};
+use crate::setup::RunConfig;
+
+/// Summary of a run, as `summary.json` holds it. Times in s, lengths in mm, shares of 1.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Scenario.
+    pub scenario: String,
+    /// Robot that the controller believes in.
+    pub robot: String,
+    /// Law and compensation.
+    pub law: String,
+    /// Control rate.
+    pub rate_hz: f64,
+    /// Announced payload.
+    pub payload_kg: f64,
+    /// Cycles completed.
+    pub cycles: u32,
+    /// Whether the scenario ran to its end.
+    pub completed: bool,
+    /// Why not.
+    pub error: Option<String>,
+    /// From the start of motion until the tool is back within 1 mm and stays.
+    pub cycle_time_s: Option<Spread>,
+    /// From the end of the commanded motion until the tool is within 0.01 mm and stays.
+    pub settle_time_s: Option<MeanMax>,
+    /// True tool to commanded tool at the same instant, while the reference moves.
+    pub tracking_error_mm: RmsMax,
+    /// Distance from the target at the end of a dwell.
+    pub final_error_mm: FinalError,
+    /// Peak effort over its limit.
+    pub torque_utilisation: [f64; 4],
+    /// Root-mean-square effort over the continuous limit.
+    pub thermal_utilisation: [f64; 4],
+    /// Peak speed over its limit.
+    pub speed_utilisation: [f64; 4],
+    /// Longest time with a motor at its limit.
+    pub longest_saturation_s: f64,
+    /// Share of the time that the bus was taken.
+    pub bus_load: f64,
+    /// Frames delivered.
+    pub frames: u64,
+    /// Samples whose command had not come when the next sample was taken.
+    pub overruns: u64,
+    /// Frames that a full transmit queue or an identifier collision lost.
+    pub frames_lost: u64,
+    /// Faults that the controller reported.
+    pub faults: Vec<Fault>,
+    /// Simulated time.
+    pub sim_time_s: f64,
+    /// Every cycle by itself.
+    pub each_cycle: Vec<CycleResult>,
+}
+
+/// Greatest distance from the target.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FinalError {
+    /// mm.
+    pub max: Option<f64>,
+}
+
+/// A fault that the controller reported.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fault {
+    /// When, s.
+    pub time_s: f64,
+    /// Cause.
+    pub cause: &'static str,
+    /// Emergency error code (CiA 301, CiA 402), hexadecimal.
+    pub code: String,
+    /// What it means.
+    pub description: &'static str,
+}
+
+/// The observer that makes a [`Summary`].
+pub struct Collector {
+    metrics: Metrics,
+    faults: Vec<Fault>,
+    target: [f64; 3],
+}
+
+impl Collector {
+    /// An empty one for this run.
+    pub fn new(config: &RunConfig) -> Self {
+        Self {
+            metrics: Metrics::new(&config.actual),
+            faults: Vec::new(),
+            target: config.cycle_target(),
+        }
+    }
+
+    /// What the run came to; `result` says how it ended.
+    pub fn finish<E: Endpoint>(
+        self,
+        config: &RunConfig,
+        rig: &Rig<E>,
+        result: &Result<(), RunError>,
+    ) -> Summary {
+        let Self {
+            metrics, faults, ..
+        } = self;
+        let scenario = &config.scenario;
+        let bus = rig.bus();
+        let sim = rig.time();
+        Summary {
+            scenario: scenario.name.clone(),
+            robot: config.nominal.name.clone(),
+            law: scenario.law.to_string(),
+            rate_hz: scenario.rate_hz,
+            payload_kg: scenario.payload.map_or(0.0, |payload| payload.mass),
+            cycles: metrics.cycles.len() as u32,
+            completed: result.is_ok(),
+            error: result.as_ref().err().map(ToString::to_string),
+            cycle_time_s: metrics.cycle_time_s(),
+            settle_time_s: metrics.settle_time_s(),
+            tracking_error_mm: metrics.tracking_error_mm(),
+            final_error_mm: FinalError {
+                max: metrics.final_error_mm(),
+            },
+            torque_utilisation: metrics.torque_utilisation(),
+            thermal_utilisation: metrics.thermal_utilisation(),
+            speed_utilisation: metrics.speed_utilisation(),
+            longest_saturation_s: metrics.longest_saturation as f64 / scenario.rate_hz,
+            bus_load: bus.total.load((sim * 1e9) as u64),
+            frames: bus.total.frames,
+            overruns: rig.drives().overruns(),
+            frames_lost: rig.dropped() + 2 * bus.collisions,
+            faults,
+            sim_time_s: sim,
+            each_cycle: metrics.cycles,
+        }
+    }
+}
+
+impl Observer for Collector {
+    fn frame(&mut self, time: u64, frame: &CanFrame) -> io::Result<()> {
+        if table::of_frame(frame).map(|info| info.content)
+            != Some(Content::Emergency(Node::Controller))
+        {
+            return Ok(());
+        }
+        if let Ok(received) = codec::decode(frame)
+            && let Message::Emergency(_, emergency) = received.message
+        {
+            self.faults.push(Fault {
+                time_s: time as f64 * 1e-9,
+                cause: emergency.cause.name(),
+                code: format!("{:04x}", emergency.code),
+                description: emergency.cause.describe(),
+            });
+        }
+        Ok(())
+    }
+
+    fn sample(&mut self, truth: &Truth) -> io::Result<()> {
+        self.metrics.sample(truth);
+        Ok(())
+    }
+
+    fn hand(&mut self, hand: &Hand) {
+        match hand {
+            Hand::BeginCycle => self.metrics.begin_cycle(self.target),
+            Hand::EndCycle => self.metrics.end_cycle(),
+            Hand::Attach(_) | Hand::Release => {}
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Model files: what is accepted, and what a refusal says.
+
+use sim::model::{Payload, RobotModel};
+
+const DEFAULT: &str = include_str!("../../models/irb930-22-1.05.json");
+
+/// The default model file with one passage replaced.
+fn edited(from: &str, to: &str) -> String {
+    assert_eq!(
+        DEFAULT.matches(from).count(),
+        1,
+        "{from} must stand once in the file"
+    );
+    DEFAULT.replace(from, to)
+}
+
+fn refusal(text: &str) -> String {
+    RobotModel::from_json(text)
+        .expect_err("must be refused")
+        .to_string()
+}
+
+/// Line of the default file that contains `passage`, counted from 1.
+fn line_of(passage: &str) -> usize {
+    1 + DEFAULT
+        .lines()
+        .position(|line| line.contains(passage))
+        .unwrap()
+}
+
+#[test]
+fn every_mistake_is_named_with_its_place_and_what_is_allowed() {
+    let cases = [
+        (
+            r#""a1": 0.56"#,
+            r#""a1": -0.56"#,
+            "dh.a1 is -0.56; it must be a number > 0",
+        ),
+        (
+            r#""a2": 0.49"#,
+            r#""a2": "0.49""#,
+            r#"dh.a2 is "0.49"; it must be a number > 0"#,
+        ),
+        (
+            r#""mass": 14.5"#,
+            r#""mass": 0"#,
+            "links[1].mass is 0; it must be a number > 0",
+        ),
+        (
+            r#""upper": [2.6"#,
+            r#""upper": [-2.7"#,
+            "must be above the lower limit -2.6179938779914944",
+        ),
+        (
+            r#""screw_hand_sign": 1.0"#,
+            r#""screw_hand_sign": 0.5"#,
+            "drive.screw_hand_sign is 0.5; it must be 1 or -1",
+        ),
+        (
+            r#": 131072"#,
+            r#": 131072.5"#,
+            "drive.encoder_counts_per_motor_rev is 131072.5; it must be a whole number",
+        ),
+        (
+            r#""gravity": [0.0, 0.0"#,
+            r#""gravity": [0.0, 0.1"#,
+            "gravity is an array of 3; it must be vertical",
+        ),
+        (
+            r#"3.141592653589793, 0.0, 0.0]"#,
+            r#"0.0, 0.0, 0.0]"#,
+            "dh.alpha is an array of 4; it must be [0, pi, 0, 0]",
+        ),
+        (
+            r#""viscous": [4.0, 1.5"#,
+            r#""viscous": [4.0, -1.5"#,
+            "drive.viscous[1] is -1.5; it must be a number >= 0",
+        ),
+        (
+            r#""viscous": [4.0, 1.5,"#,
+            r#""viscous": [4.0,"#,
+            "drive.viscous is an array of 3; it must be an array of 4",
+        ),
+        (
+            r#""com_joint_frame": [0.2, "#,
+            r#""com_joint_frame": [null, "#,
+            "links[1].com_joint_frame[0] is null",
+        ),
+    ];
+    for (from, to, expected) in cases {
+        let message = refusal(&edited(from, to));
+        let place = format!("line {}: ", line_of(from));
+        assert!(
+            message.starts_with(&place) && message.contains(expected),
+            "{message}\nshould be at {place}{expected}"
+        );
+    }
+}
+
+#[test]
+fn what_is_missing_is_named_with_the_line_of_its_object() {
+    let message = refusal(&edited(r#""screw_hand_sign""#, r#""screw_hand""#));
+    let place = line_of(r#""drive": {"#);
+    assert_eq!(
+        message,
+        format!("line {place}: drive.screw_hand_sign is missing; it must be a finite number")
+    );
+    assert_eq!(
+        refusal("{}"),
+        "line 1: dh is missing; it must be the Denavit-Hartenberg table"
+    );
+    assert_eq!(
+        refusal("[]"),
+        "line 1: the document is an array of 0; it must be a JSON object"
+    );
+    assert!(refusal("{\n\"a\": }").starts_with("line 2: not JSON: "));
+    assert!(refusal("").starts_with("line 1: not JSON: "));
+}
+
+#[test]
+fn the_place_survives_escapes_nesting_and_repeated_keys() {
+    // Text with quotes and brackets in front, and a first "dh" that the parser lets the second one replace.
+    let text = "{\"note\": \"a \\\" ] } , dh\", \"dh\": {\"a1\": [{}, 1]},\n\"dh\":\n{\"alpha\": [0, 3.141592653589793, 0, 0],\n\"a1\": true}}";
+    assert_eq!(
+        refusal(text),
+        "line 4: dh.a1 is true; it must be a number > 0"
+    );
+}
+
+#[test]
+fn unknown_keys_are_tolerated() {
+    let text = edited(r#""units""#, r#""comment": {"any": [1, "thing"]}, "units""#);
+    assert_eq!(
+        RobotModel::from_json(&text).unwrap(),
+        (RobotModel::irb_930_22_105(), vec![])
+    );
+}
+
+#[test]
+fn derived_numbers_that_contradict_are_reported_and_not_used() {
+    let text = edited(
+        r#""com_joint_frame": [0.2, 0.0, 0.0902]"#,
+        r#""com_joint_frame": [0.2, 0.0, 0.0902], "lc": 0.3, "com_dh_frame": [-0.29, 0.0, 0.0902]"#,
+    );
+    let (model, warnings) = RobotModel::from_json(&text).unwrap();
+    assert_eq!(model, RobotModel::irb_930_22_105());
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(
+        warnings[0].contains("links[1].com_dh_frame is [-0.29, 0.0, 0.0902]"),
+        "{warnings:?}"
+    );
+    assert!(
+        warnings[1]
+            .contains("links[1].lc is 0.3, but links[1].com_joint_frame, which is used, gives 0.2")
+    );
+    let text = edited(
+        r#""com_joint_frame": [0.2, 0.0, 0.0902]"#,
+        r#""com_joint_frame": [0.2, 0.0, 0.0902], "lc": 0.2, "com_dh_frame": [-0.29, 0.0, -0.0902]"#,
+    );
+    assert_eq!(
+        RobotModel::from_json(&text).unwrap().1,
+        Vec::<String>::new()
+    );
+}
+
+#[test]
+fn the_short_robot_differs_where_it_should() {
+    let (long, short) = (RobotModel::irb_930_22_105(), RobotModel::irb_930_12_085());
+    assert_eq!(
+        (short.geometry.a1, short.links[0].mass, short.payload_max),
+        (0.36, 9.5, 12.0)
+    );
+    assert_eq!(
+        (short.links[1], short.drive, short.limits),
+        (long.links[1], long.drive, long.limits)
+    );
+}
+
+#[test]
+fn a_payload_may_be_a_point_but_not_less_than_nothing() {
+    let text = |mass: f64| {
+        format!(
+            r#"{{"mass": {mass}, "com_flange_frame": [0, 0, 0.1], "inertia_com_diag": [0, 0, 0]}}"#
+        )
+    };
+    assert_eq!(
+        Payload::from_json(&text(2.0)).unwrap(),
+        Payload {
+            mass: 2.0,
+            com: [0.0, 0.0, 0.1],
+            inertia: [0.0; 3]
+        }
+    );
+    let message = Payload::from_json(&text(-2.0)).unwrap_err().to_string();
+    assert_eq!(message, "line 1: mass is -2; it must be a number >= 0");
+}

@@ -1,0 +1,306 @@
+//! Judges a trace by the rules of the protocol.
+//!
+//! - Time does not run backwards.
+//! - Every frame of ours is one that the codec accepts: format, length, CRC, codes, ranges.
+//! - Every end-to-end counter counts one up; so does the sample number of the feedback.
+//! - A command echoes the newest feedback, and no feedback waits for its command until the next.
+//! - No message that comes at a rate stays away for longer than two and a half periods, no feedback for longer than the
+//!   controller's watchdog.
+//! - No torque is asked for without torque enabled, and none beyond the limits of the motors.
+//!
+//! Foreign identifiers and error frames are counted, not judged.
+
+use firmware::mechanics::arm::ArmModel;
+use firmware::node::PEER_TIMEOUT_US;
+use protocol::codec::{self, DecodeError};
+use protocol::e2e::{Receiver, Verdict};
+use protocol::frame::CanFrame;
+use protocol::messages::{Command, ControlWord, Message};
+use protocol::schema::{MessageInfo, Rate};
+use protocol::table::{self, TABLE};
+
+use trace::{Entry, Record};
+
+/// The first rule that a trace breaks.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Offence {
+    /// Time runs backwards.
+    #[error("time runs backwards by {by_us} us")]
+    Backwards {
+        /// By how much.
+        by_us: u64,
+    },
+    /// The codec refuses the frame.
+    #[error("{message}: {error}")]
+    Refused {
+        /// Message of the identifier.
+        message: &'static str,
+        /// Why.
+        error: DecodeError,
+    },
+    /// The counter does not count one up.
+    #[error("{message}: counter {counter} {}", sequence(*verdict))]
+    Counter {
+        /// Message.
+        message: &'static str,
+        /// Counter of the frame.
+        counter: u8,
+        /// What it says.
+        verdict: Verdict,
+    },
+    /// The sample number does not count one up.
+    #[error("Feedback: sample {found} where {expected} is due")]
+    Sample {
+        /// Number of the frame.
+        found: u32,
+        /// Number after that of the frame before.
+        expected: u32,
+    },
+    /// A command that answers nothing.
+    #[error("Command: echoes sample {found} before any feedback")]
+    NoFeedback {
+        /// Sample echoed.
+        found: u32,
+    },
+    /// A command for another sample than the newest.
+    #[error("Command: echoes sample {found}, the newest feedback is {newest}")]
+    Echo {
+        /// Sample echoed.
+        found: u32,
+        /// Newest sample.
+        newest: u32,
+    },
+    /// A sample was answered twice.
+    #[error("Command: sample {sample} has been answered already")]
+    Twice {
+        /// Sample echoed.
+        sample: u32,
+    },
+    /// A sample was not answered.
+    #[error("Feedback: no command has answered sample {sample} before")]
+    Unanswered {
+        /// Sample without answer.
+        sample: u32,
+    },
+    /// A message stayed away.
+    #[error("{message}: none for {age_us} us; {limit_us} us are allowed")]
+    Age {
+        /// Message.
+        message: &'static str,
+        /// Time since the last.
+        age_us: u64,
+        /// Longest allowed.
+        limit_us: u64,
+    },
+    /// Torque without torque enabled.
+    #[error("Command: motor {motor} shall give {torque} N m while torque is not enabled")]
+    TorqueDisabled {
+        /// Motor, 0 to 3.
+        motor: usize,
+        /// Torque asked for, N m.
+        torque: f32,
+    },
+    /// Torque beyond a motor's limit.
+    #[error("Command: motor {motor} shall give {torque} N m; {limit} N m are allowed")]
+    TorqueLimit {
+        /// Motor, 0 to 3.
+        motor: usize,
+        /// Torque asked for, N m.
+        torque: f32,
+        /// Limit of the motor, N m.
+        limit: f32,
+    },
+}
+
+fn sequence(verdict: Verdict) -> String {
+    match verdict {
+        Verdict::Initial | Verdict::Fresh => "is the next".into(),
+        Verdict::Lost(frames) => format!("tells that {frames} frames are missing"),
+        Verdict::Duplicate => "comes a second time".into(),
+        Verdict::Stale(frames) => format!("is {frames} frames older than the newest"),
+    }
+}
+
+/// Judges record by record.
+pub struct Checker {
+    torque_limit: [f32; 4],
+    newest_us: u64,
+    messages: [Watch; TABLE.len()],
+    /// Newest sample, and whether a command has answered it.
+    sample: Option<(u32, bool)>,
+    commanded: bool,
+    counts: Counts,
+}
+
+/// How much was judged, and how much was not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Frames of ours.
+    pub judged: u64,
+    /// Frames of identifiers that are not ours.
+    pub foreign: u64,
+    /// Error frames.
+    pub error_frames: u64,
+}
+
+/// One message of the table.
+struct Watch {
+    info: &'static MessageInfo,
+    receiver: Option<Receiver>,
+    seen_us: Option<u64>,
+    limit_us: Option<u64>,
+}
+
+impl Checker {
+    /// A judge of traces of this robot.
+    #[must_use]
+    pub fn new(arm: &ArmModel) -> Self {
+        Self {
+            torque_limit: arm.drive.motor_torque_limit.into(),
+            newest_us: 0,
+            messages: TABLE.map(|info| Watch {
+                info,
+                receiver: info.protection.map(Receiver::new),
+                seen_us: None,
+                limit_us: match info.rate {
+                    Rate::EverySample => Some(PEER_TIMEOUT_US),
+                    Rate::Hertz(hertz) => Some(2_500_000 / u64::from(hertz)),
+                    Rate::Event => None,
+                },
+            }),
+            sample: None,
+            commanded: false,
+            counts: Counts::default(),
+        }
+    }
+
+    /// Judges the next record.
+    ///
+    /// # Errors
+    /// The rule it breaks. What follows in the trace is judged as if it had not.
+    pub fn record(&mut self, record: &Record) -> Result<(), Offence> {
+        let time_us = record.time_us;
+        if time_us < self.newest_us {
+            let by_us = self.newest_us - time_us;
+            return Err(Offence::Backwards { by_us });
+        }
+        self.newest_us = time_us;
+        self.ages(time_us)?;
+        match &record.entry {
+            Entry::Error(_) => {
+                self.counts.error_frames += 1;
+                Ok(())
+            }
+            Entry::Frame(frame) => match table::of_frame(frame) {
+                None => {
+                    self.counts.foreign += 1;
+                    Ok(())
+                }
+                Some(info) => {
+                    self.counts.judged += 1;
+                    self.frame(time_us, info, frame)
+                }
+            },
+        }
+    }
+
+    /// What was judged so far.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    fn ages(&mut self, now_us: u64) -> Result<(), Offence> {
+        for watch in &mut self.messages {
+            if let (Some(seen_us), Some(limit_us)) = (watch.seen_us, watch.limit_us)
+                && now_us - seen_us > limit_us
+            {
+                // Told once; the next frame begins anew.
+                watch.seen_us = None;
+                return Err(Offence::Age {
+                    message: watch.info.name,
+                    age_us: now_us - seen_us,
+                    limit_us,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn frame(
+        &mut self,
+        time_us: u64,
+        info: &'static MessageInfo,
+        frame: &CanFrame,
+    ) -> Result<(), Offence> {
+        let received = codec::decode(frame).map_err(|error| Offence::Refused {
+            message: info.name,
+            error,
+        })?;
+        if let Some(watch) = self.messages.iter_mut().find(|watch| watch.info == info) {
+            watch.seen_us = Some(time_us);
+            if let (Some(counter), Some(receiver)) = (received.counter, &mut watch.receiver) {
+                let verdict = receiver.judge(counter);
+                if !matches!(verdict, Verdict::Initial | Verdict::Fresh) {
+                    return Err(Offence::Counter {
+                        message: info.name,
+                        counter,
+                        verdict,
+                    });
+                }
+            }
+        }
+        match received.message {
+            Message::Feedback(feedback) => self.feedback(feedback.sample),
+            Message::Command(command) => self.command(&command),
+            _ => Ok(()),
+        }
+    }
+
+    fn feedback(&mut self, found: u32) -> Result<(), Offence> {
+        let before = self.sample.replace((found, false));
+        let Some((sample, answered)) = before else {
+            return Ok(());
+        };
+        let expected = sample.wrapping_add(1);
+        if found != expected {
+            return Err(Offence::Sample { found, expected });
+        }
+        // The drives may run before the controller does.
+        if self.commanded && !answered {
+            return Err(Offence::Unanswered { sample });
+        }
+        Ok(())
+    }
+
+    fn command(&mut self, command: &Command) -> Result<(), Offence> {
+        self.commanded = true;
+        let found = command.sample;
+        match &mut self.sample {
+            None => return Err(Offence::NoFeedback { found }),
+            Some((newest, _)) if *newest != found => {
+                return Err(Offence::Echo {
+                    found,
+                    newest: *newest,
+                });
+            }
+            Some((sample, true)) => return Err(Offence::Twice { sample: *sample }),
+            Some((_, answered)) => *answered = true,
+        }
+        let enabled = command.control.contains(ControlWord::TORQUE_ENABLE);
+        for (motor, (&torque, &limit)) in command.torque.iter().zip(&self.torque_limit).enumerate()
+        {
+            if !enabled && torque != 0.0 {
+                return Err(Offence::TorqueDisabled { motor, torque });
+            }
+            if torque.abs() > limit {
+                return Err(Offence::TorqueLimit {
+                    motor,
+                    torque,
+                    limit,
+                });
+            }
+        }
+        Ok(())
+    }
+}

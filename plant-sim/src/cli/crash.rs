@@ -1,0 +1,78 @@
+//! `plant-sim crash`: faults of the controller on the emulated Cortex-M4F, and where they end.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use plant_sim::crash::{self, Planted, Seen};
+use plant_sim::input;
+use plant_sim::qemu;
+use sim::setup::RunConfig;
+
+use super::show;
+
+/// Arguments of `crash`.
+#[derive(Args)]
+pub struct CrashArgs {
+    /// The image, instead of the one built from the sources; it has to be one that plants faults.
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
+}
+
+/// Plants one fault after the other into a moving arm. Fails if one of them does not end in the
+/// safe state.
+pub fn run(args: &CrashArgs) -> Result<ExitCode, String> {
+    let image = match &args.image {
+        Some(image) => image.clone(),
+        None => qemu::build(qemu::FAULTS_IMAGE).map_err(|error| error.to_string())?,
+    };
+    let config = RunConfig::new(input::scenario("gate").map_err(|error| error.to_string())?);
+    show(
+        "planted                pins          reason      fault at    status      mode             torque off\n",
+    )?;
+    let mut bad = false;
+    for planted in Planted::all() {
+        let name = planted.name();
+        match crash::plant(&config, &image, planted) {
+            Ok(seen) => {
+                let wrong = seen.wrong(planted);
+                bad |= !wrong.is_empty();
+                show(&row(name, &seen, &wrong))?;
+            }
+            Err(error) => {
+                bad = true;
+                show(&format!("{name:<22} FAILED: {error}\n"))?;
+            }
+        }
+    }
+    if bad {
+        return Err("a fault did not end in the safe state".into());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// One line a fault, and one more for each thing that is wrong.
+fn row(name: &str, seen: &Seen, wrong: &[String]) -> String {
+    let mut text = format!("{name:<22} ");
+    if let Some(stop) = &seen.stop {
+        let _ = write!(
+            text,
+            "{:04b} > {:04b}   {:<10}  {:#010x}  {:#010x}  ",
+            stop.pins[0],
+            stop.pins[1],
+            stop.reason.name(),
+            stop.at,
+            stop.status
+        );
+    }
+    let mode = seen.mode.map_or("none", |mode| mode.name());
+    let _ = match seen.let_go {
+        Some(samples) => writeln!(text, "{mode:<16} {samples} samples"),
+        None => writeln!(text, "{mode:<16} never"),
+    };
+    for what in wrong {
+        let _ = writeln!(text, "    FAILED: {what}");
+    }
+    text
+}

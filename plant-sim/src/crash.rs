@@ -1,0 +1,353 @@
+//! Faults of the controller on the emulated board, planted in mid-motion: what the pins, the drives and the bus show.
+
+use std::path::Path;
+
+use channel::Fault;
+use firmware::cabinet::pins::{RUNNING, TORQUE_OFF};
+use firmware::cabinet::reset::Stop;
+use protocol::codec;
+use protocol::frame::CanFrame;
+use protocol::messages::{DriveStatus, Message, Mode, Nmt, NmtCommand, Node as Name, ResetReason};
+
+use crate::qemu::{Channel, Options, Qemu};
+use sim::drives::HOLD_SAMPLES;
+use sim::operator::Operator;
+use sim::rig::{Observer, Rig, Truth};
+use sim::setup::RunConfig;
+
+/// Samples for which the arm has been moving when the fault is planted.
+const IN_MOTION: u32 = 100;
+/// Samples from the fault to the verdict: time for five heartbeats.
+const AFTERWARDS: u64 = 500;
+/// Samples until the drives have let go, at most: they hold the last command for some, and a frame is under way.
+const LET_GO: u64 = HOLD_SAMPLES as u64 + 3;
+/// Fault status of an access that is not allowed, by an instruction or while stacking (CFSR: DACCVIOL, MSTKERR).
+const OUT_OF_STACK: u32 = 1 << 1 | 1 << 4;
+/// Speed below which the lift stands, m/s.
+const STANDING: f64 = 1e-3;
+
+/// What is planted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Planted {
+    /// By the image itself.
+    Fault(Fault),
+    /// By network management, which every image obeys, its frames on this channel.
+    Reset(Channel),
+}
+
+impl Planted {
+    /// Everything that can be planted.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Fault::ALL
+            .into_iter()
+            .map(Self::Fault)
+            .chain([Channel::Fifo, Channel::Uart].map(Self::Reset))
+    }
+
+    /// Name, lower case with hyphens.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fault(fault) => fault.name(),
+            Self::Reset(Channel::Fifo) => "software-reset",
+            Self::Reset(Channel::Uart) => "reset-over-uart",
+        }
+    }
+
+    /// Reason that the controller has to give.
+    fn reason(self) -> ResetReason {
+        match self {
+            Self::Fault(Fault::Panic) => ResetReason::Panic,
+            Self::Fault(_) => ResetReason::HardFault,
+            Self::Reset(_) => ResetReason::Software,
+        }
+    }
+
+    /// Bits of the fault status of which one has to be set.
+    fn status(self) -> u32 {
+        match self {
+            Self::Fault(Fault::StackOverflow | Fault::OverflowInInterrupt) => OUT_OF_STACK,
+            Self::Fault(Fault::HardFault) => u32::MAX,
+            Self::Fault(Fault::Panic) | Self::Reset(_) => 0,
+        }
+    }
+}
+
+/// What was seen of one fault.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// What the board told when it had started again.
+    pub stop: Option<Stop>,
+    /// Reasons in the heartbeats since.
+    pub reasons: Vec<ResetReason>,
+    /// Mode in the newest heartbeat.
+    pub mode: Option<Mode>,
+    /// Samples until the drives had no torque and the brake was closing, for good.
+    pub let_go: Option<u64>,
+    /// Whether the lift's brake was closed in the end.
+    pub braked: bool,
+    /// Speed of the lift in the end, m/s. The other axes have no brake: they coast.
+    pub lift: f64,
+    /// The log, of before and after.
+    pub log: String,
+}
+
+impl Seen {
+    /// What is not as it has to be after `planted`; nothing if all is well.
+    pub fn wrong(&self, planted: Planted) -> Vec<String> {
+        let reason = planted.reason();
+        let stop = self.stop.as_ref();
+        let status = stop.map_or(0, |stop| stop.status);
+        let expected = planted.status();
+        [
+            (
+                stop.is_none_or(|stop| stop.pins != [RUNNING, TORQUE_OFF]),
+                "pins not as in motion before, or not as without torque after",
+            ),
+            (
+                stop.is_none_or(|stop| stop.reason != reason),
+                "another reason in the record",
+            ),
+            (
+                (status & expected == 0) != (expected == 0),
+                "fault status of another fault",
+            ),
+            (
+                self.reasons.is_empty() || self.reasons.iter().any(|seen| *seen != reason),
+                "another reason in a heartbeat, or none",
+            ),
+            (
+                self.mode != Some(Mode::PreOperational),
+                "controller not disabled",
+            ),
+            (
+                self.let_go.is_none_or(|samples| samples > LET_GO),
+                "drives under torque for too long",
+            ),
+            (!self.braked, "brake open"),
+            (self.lift.abs() > STANDING, "lift moving"),
+            (
+                !self.log.contains(&format!("started: {reason:?}")),
+                "another reason in the log",
+            ),
+        ]
+        .into_iter()
+        .filter(|(wrong, _)| *wrong)
+        .map(|(_, what)| what.to_string())
+        .collect()
+    }
+}
+
+/// Plants a fault in the middle of the first move of a scenario, and looks on for a while.
+///
+/// # Errors
+/// The run did not get that far, or the board did not start again.
+pub fn plant(config: &RunConfig, image: &Path, planted: Planted) -> Result<Seen, String> {
+    let text = |error: &dyn std::error::Error| error.to_string();
+    let rig = config.rig().map_err(|error| text(&error))?;
+    let options = Options {
+        image: Some(image.into()),
+        channel: match planted {
+            Planted::Fault(_) => Channel::Fifo,
+            Planted::Reset(channel) => channel,
+        },
+        ..Options::default()
+    };
+    let controller = Qemu::start(rig.controller(), &options).map_err(|error| text(&error))?;
+    let mut rig = Rig::new(&rig, controller);
+    let mut operator = Operator::new(&config.scenario);
+    let mut watch = Watch::default();
+    while watch.moving < IN_MOTION {
+        rig.step(&mut operator, &mut watch)
+            .map_err(|error| text(&error))?;
+        if operator.is_done() {
+            return Err("the arm never moved for long enough".into());
+        }
+    }
+    match planted {
+        Planted::Fault(fault) => rig
+            .controller()
+            .plant(fault)
+            .map_err(|error| text(&error))?,
+        Planted::Reset(_) => rig.inject(&reset()),
+    }
+    watch.since = Some(0);
+    // The operator waits for the end of its move, and asks for nothing more.
+    for _ in 0..AFTERWARDS {
+        rig.step(&mut operator, &mut watch)
+            .map_err(|error| text(&error))?;
+    }
+    watch.seen.stop = rig.controller().last_stop();
+    watch.seen.log = rig.controller().take_log()?;
+    Ok(watch.seen)
+}
+
+fn reset() -> CanFrame {
+    let reset = Nmt {
+        command: NmtCommand::ResetNode,
+        node: Name::Controller.code(),
+    };
+    codec::encode(&Message::Nmt(reset), 0).expect("two bytes without floats")
+}
+
+/// Watches the bus and the arm.
+#[derive(Default)]
+struct Watch {
+    /// Samples in which the arm has been moving.
+    moving: u32,
+    /// Samples since the fault.
+    since: Option<u64>,
+    seen: Seen,
+}
+
+impl Observer for Watch {
+    fn frame(&mut self, _: u64, frame: &CanFrame) -> std::io::Result<()> {
+        let (Some(samples), Ok(received)) = (self.since, codec::decode(frame)) else {
+            return Ok(());
+        };
+        match received.message {
+            Message::Heartbeat(Name::Controller, heartbeat) => {
+                self.seen.reasons.push(heartbeat.reset);
+                self.seen.mode = Some(heartbeat.state);
+            }
+            Message::Feedback(feedback) => {
+                let torque = feedback.status.contains(DriveStatus::TORQUE_ON);
+                self.seen.let_go = match self.seen.let_go {
+                    _ if torque => None,
+                    None => Some(samples),
+                    seen => seen,
+                };
+                self.seen.braked = !feedback.status.contains(DriveStatus::BRAKE_RELEASED);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn sample(&mut self, truth: &Truth) -> std::io::Result<()> {
+        self.moving += u32::from(truth.mode == Mode::Moving);
+        self.since = self.since.map(|samples| samples + 1);
+        self.seen.lift = truth.qd[2];
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good() -> Seen {
+        Seen {
+            stop: Some(Stop {
+                reason: ResetReason::HardFault,
+                pins: [RUNNING, TORQUE_OFF],
+                at: 0x1234,
+                status: OUT_OF_STACK,
+            }),
+            reasons: vec![ResetReason::HardFault; 5],
+            mode: Some(Mode::PreOperational),
+            let_go: Some(LET_GO),
+            braked: true,
+            lift: 0.0,
+            log: "0.342 INFO started: HardFault".into(),
+        }
+    }
+
+    /// Every single thing that can be wrong is, one at a time.
+    #[test]
+    fn whatever_is_not_as_it_has_to_be_is_named() {
+        const PLANTED: Planted = Planted::Fault(Fault::StackOverflow);
+        assert_eq!(good().wrong(PLANTED), Vec::<String>::new());
+        let stop = good().stop.unwrap();
+        let other = |change: &dyn Fn(&mut Stop)| {
+            let mut stop = stop;
+            change(&mut stop);
+            Some(stop)
+        };
+        let cases: [(&str, Seen); 11] = [
+            (
+                "pins",
+                Seen {
+                    stop: other(&|stop| stop.pins = [RUNNING; 2]),
+                    ..good()
+                },
+            ),
+            (
+                "record",
+                Seen {
+                    stop: other(&|stop| stop.reason = ResetReason::Panic),
+                    ..good()
+                },
+            ),
+            (
+                "status",
+                Seen {
+                    stop: other(&|stop| stop.status = 1 << 16),
+                    ..good()
+                },
+            ),
+            (
+                "heartbeat",
+                Seen {
+                    reasons: vec![],
+                    ..good()
+                },
+            ),
+            (
+                "heartbeat",
+                Seen {
+                    reasons: vec![ResetReason::PowerOn],
+                    ..good()
+                },
+            ),
+            (
+                "disabled",
+                Seen {
+                    mode: Some(Mode::Enabled),
+                    ..good()
+                },
+            ),
+            (
+                "torque",
+                Seen {
+                    let_go: None,
+                    ..good()
+                },
+            ),
+            (
+                "torque",
+                Seen {
+                    let_go: Some(LET_GO + 1),
+                    ..good()
+                },
+            ),
+            (
+                "brake",
+                Seen {
+                    braked: false,
+                    ..good()
+                },
+            ),
+            (
+                "lift",
+                Seen {
+                    lift: -0.1,
+                    ..good()
+                },
+            ),
+            (
+                "log",
+                Seen {
+                    log: "0.000 INFO started: PowerOn".into(),
+                    ..good()
+                },
+            ),
+        ];
+        for (word, seen) in cases {
+            let wrong = seen.wrong(PLANTED);
+            assert!(
+                wrong.len() == 1 && wrong[0].contains(word),
+                "{word}: {wrong:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! What a person names on the command line, read: scenarios, robots, payloads.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use sim::model::{ModelError, Payload, RobotModel};
+use sim::scenario::{self, Scenario, ScenarioError};
+
+/// Why an input cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// Neither a built-in scenario nor a file.
+    #[error(
+        "no scenario '{name}': neither a file nor one of {}",
+        scenario::names()
+    )]
+    NoScenario {
+        /// What was asked for.
+        name: String,
+    },
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read {
+        /// File.
+        path: PathBuf,
+        /// Reason.
+        source: io::Error,
+    },
+    /// The scenario is wrong.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The model or payload is wrong.
+    #[error("{}: {source}", path.display())]
+    Model {
+        /// File.
+        path: PathBuf,
+        /// What is wrong in it.
+        source: ModelError,
+    },
+}
+
+/// The scenario of this name, or in this file.
+///
+/// # Errors
+/// See [`InputError`].
+pub fn scenario(name: &str) -> Result<Scenario, InputError> {
+    if let Some(scenario) = Scenario::built_in(name) {
+        return Ok(scenario);
+    }
+    let path = Path::new(name);
+    if !path.exists() {
+        return Err(InputError::NoScenario { name: name.into() });
+    }
+    Ok(Scenario::parse(&text(path)?, name)?)
+}
+
+/// The robot in this file, with warnings about numbers in it that contradict each other.
+///
+/// # Errors
+/// See [`InputError`].
+pub fn robot(path: &Path) -> Result<(RobotModel, Vec<String>), InputError> {
+    RobotModel::from_json(&text(path)?).map_err(|source| in_file(path, source))
+}
+
+/// The payload in this file.
+///
+/// # Errors
+/// See [`InputError`].
+pub fn payload(path: &Path) -> Result<Payload, InputError> {
+    Payload::from_json(&text(path)?).map_err(|source| in_file(path, source))
+}
+
+fn text(path: &Path) -> Result<String, InputError> {
+    std::fs::read_to_string(path).map_err(|source| InputError::Read {
+        path: path.into(),
+        source,
+    })
+}
+
+fn in_file(path: &Path, source: ModelError) -> InputError {
+    InputError::Model {
+        path: path.into(),
+        source,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{robot, scenario};
+
+    #[test]
+    fn what_is_not_there_is_named_with_what_is() {
+        let message = scenario("nowhere.toml").unwrap_err().to_string();
+        assert!(
+            message.contains("nowhere.toml") && message.contains("gate, gate-mismatch"),
+            "{message}"
+        );
+        let message = robot("no/such/robot.json".as_ref())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("no/such/robot.json") && message.contains("cannot be read"),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,127 @@
+//! A bus as it is now: what was seen of it in the last second, and what has gone wrong since the start.
+
+mod view;
+
+use std::collections::{BTreeMap, VecDeque};
+
+use protocol::codec;
+use protocol::frame::Id;
+use protocol::messages::{Cause, Message, State};
+
+use protocol::wire::BitTiming;
+use trace::stats::{Gatherer, Statistics};
+use trace::{Entry, Record};
+
+/// Span of the rates shown, us.
+const WINDOW_US: u64 = 1_000_000;
+/// Events kept.
+const EVENTS: usize = 8;
+/// The same event again within this time is one, us.
+const REPEATED_US: u64 = 100_000;
+
+/// Gathers what is shown.
+pub struct Monitor {
+    title: String,
+    timing: BitTiming,
+    /// Since the start: losses and errors.
+    total: Gatherer,
+    /// Since the last full second, and the second before it: rates, jitter, load.
+    growing: Gatherer,
+    window: Option<Statistics>,
+    window_end_us: Option<u64>,
+    started_us: Option<u64>,
+    newest_us: u64,
+    newest: BTreeMap<Id, Record>,
+    state: Option<State>,
+    events: VecDeque<Event>,
+}
+
+/// Something a person wants to know of although it is over.
+struct Event {
+    time_us: u64,
+    text: String,
+}
+
+impl Monitor {
+    /// Nothing seen yet on the bus of this name.
+    #[must_use]
+    pub fn new(title: &str) -> Self {
+        let timing = BitTiming::default();
+        Self {
+            title: title.to_owned(),
+            timing,
+            total: Gatherer::new(timing),
+            growing: Gatherer::new(timing),
+            window: None,
+            window_end_us: None,
+            started_us: None,
+            newest_us: 0,
+            newest: BTreeMap::new(),
+            state: None,
+            events: VecDeque::new(),
+        }
+    }
+
+    /// Takes in what came over the bus.
+    pub fn record(&mut self, record: &Record) {
+        self.tick(record.time_us);
+        self.total.record(record);
+        self.growing.record(record);
+        let Entry::Frame(frame) = &record.entry else {
+            self.event("error frame".into());
+            return;
+        };
+        self.newest.insert(frame.id(), *record);
+        let Ok(received) = codec::decode(frame) else {
+            return;
+        };
+        match received.message {
+            Message::State(state) => {
+                let before = self.state.replace(state);
+                if before.is_none_or(|before| before.mode != state.mode) {
+                    self.event(format!("mode {}", state.mode));
+                }
+            }
+            Message::Emergency(node, emergency) if emergency.cause == Cause::None => {
+                self.event(format!("{node}: faults cleared"));
+            }
+            Message::Emergency(node, emergency) => self.event(format!(
+                "{node}: {} (code {:04X}h): {}",
+                emergency.cause,
+                emergency.code,
+                emergency.cause.describe()
+            )),
+            Message::EStop(_) => self.event("emergency stop on the bus".into()),
+            _ => {}
+        }
+    }
+
+    /// Time goes on, also while the bus is silent.
+    pub fn tick(&mut self, now_us: u64) {
+        self.newest_us = self.newest_us.max(now_us);
+        self.started_us.get_or_insert(now_us);
+        let end = *self.window_end_us.get_or_insert(now_us + WINDOW_US);
+        if self.newest_us >= end {
+            let full = std::mem::replace(&mut self.growing, Gatherer::new(self.timing));
+            self.window = Some(full.statistics());
+            self.window_end_us = Some(self.newest_us + WINDOW_US);
+        }
+    }
+
+    fn event(&mut self, text: String) {
+        if let Some(last) = self.events.back_mut()
+            && last.text == text
+            && self.newest_us - last.time_us < REPEATED_US
+        {
+            last.time_us = self.newest_us;
+            return;
+        }
+        if self.events.len() == EVENTS {
+            self.events.pop_front();
+        }
+        self.events.push_back(Event {
+            time_us: self.newest_us,
+            text,
+        });
+    }
+}

@@ -1,0 +1,196 @@
+//! Plays a trace onto a bus, at the times of its records or at a multiple of their speed.
+//!
+//! Deadlines are absolute, so what comes late does not delay what follows. All interfaces of a trace go onto the one bus.
+
+use std::time::{Duration, Instant};
+
+use link::{Link, LinkError};
+use protocol::bus::{Bus as _, TransmitError};
+use protocol::frame::CanFrame;
+
+use trace::{Entry, Record};
+
+/// Between two attempts when the transmit queue is full: a few frames of a fast bus.
+const RETRY: Duration = Duration::from_micros(500);
+/// Time without a place in the transmit queue after which nobody is believed to take frames any more.
+const STUCK: Duration = Duration::from_secs(2);
+/// Stay on the bus after the last frame: a serial-line adapter says only then that it refused it.
+const LINGER: Duration = Duration::from_millis(100);
+/// Frames of others that are thrown away at once: a flooded bus must not keep the player from its own frames.
+const BATCH: usize = 1024;
+
+/// Why playing ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum PlayError {
+    /// The bus takes no frames.
+    #[error(
+        "the transmit queue has been full for {} s: does another node acknowledge the frames, or read them?",
+        STUCK.as_secs()
+    )]
+    Stuck,
+    /// The node is off the bus.
+    #[error("the node is off the bus")]
+    Offline,
+    /// The link failed.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+}
+
+/// When the frames of a trace are due.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    speed: f64,
+    /// Time of the first record, us.
+    origin: Option<u64>,
+    latest: Duration,
+}
+
+impl Pace {
+    /// `speed` times as fast as recorded; 0 leaves out every pause.
+    #[must_use]
+    pub fn new(speed: f64) -> Self {
+        Self {
+            speed,
+            origin: None,
+            latest: Duration::ZERO,
+        }
+    }
+
+    /// Time after the first frame at which the one of this record is due: never before an earlier one, even where the
+    /// clock of the trace was set back.
+    pub fn due(&mut self, time_us: u64) -> Duration {
+        let origin = *self.origin.get_or_insert(time_us);
+        if self.speed > 0.0 {
+            let recorded = Duration::from_micros(time_us.saturating_sub(origin)).as_secs_f64();
+            let played = Duration::try_from_secs_f64(recorded / self.speed);
+            self.latest = self.latest.max(played.unwrap_or(Duration::MAX));
+        }
+        self.latest
+    }
+}
+
+/// What was played.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Played {
+    /// Frames that the bus took.
+    pub frames: u64,
+    /// Frames that had to wait for a place in the transmit queue.
+    pub waited: u64,
+    /// Error frames: reports of a receiver, which nobody can send.
+    pub left_out: u64,
+    /// Frames that a serial-line adapter refused, or that a client lost because it did not read.
+    pub lost: u64,
+}
+
+/// Plays records, one after the other.
+#[derive(Debug)]
+pub struct Player {
+    link: Link,
+    pace: Pace,
+    start: Option<Instant>,
+    played: Played,
+}
+
+impl Player {
+    /// Plays onto `link`; see [`Pace::new`] for the speed.
+    #[must_use]
+    pub fn new(link: Link, speed: f64) -> Self {
+        Self {
+            link,
+            pace: Pace::new(speed),
+            start: None,
+            played: Played::default(),
+        }
+    }
+
+    /// Waits until somebody takes part in a bus that this process offers. Other buses are there already.
+    ///
+    /// # Errors
+    /// The link failed.
+    pub fn wait_for_client(&mut self) -> Result<(), PlayError> {
+        while matches!(&self.link, Link::SlcanHub(hub) if !hub.is_open()) {
+            self.idle(LINGER)?;
+        }
+        Ok(())
+    }
+
+    /// Sends the frame of the next record when it is due.
+    ///
+    /// # Errors
+    /// The bus does not take it; see [`PlayError`].
+    pub fn record(&mut self, record: &Record) -> Result<(), PlayError> {
+        let due = self.pace.due(record.time_us);
+        let Entry::Frame(frame) = &record.entry else {
+            self.played.left_out += 1;
+            return Ok(());
+        };
+        let start = *self.start.get_or_insert_with(Instant::now);
+        self.idle(due.saturating_sub(start.elapsed()))?;
+        self.send(frame)?;
+        self.played.frames += 1;
+        Ok(())
+    }
+
+    /// Sees the last frames out.
+    ///
+    /// # Errors
+    /// The bus does not take them; see [`PlayError`].
+    pub fn finish(mut self) -> Result<Played, PlayError> {
+        let mut left = (self.link.unsent(), Instant::now());
+        while left.0 > 0 {
+            self.idle(RETRY)?;
+            let now = self.link.unsent();
+            if now < left.0 {
+                left = (now, Instant::now());
+            } else if left.1.elapsed() > STUCK {
+                return Err(PlayError::Stuck);
+            }
+        }
+        self.idle(LINGER)?;
+        self.played.lost = match &self.link {
+            Link::SocketCan(_) => 0,
+            Link::Slcan(port) => port.refused(),
+            Link::SlcanHub(hub) => hub.lost(),
+        };
+        Ok(self.played)
+    }
+
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PlayError> {
+        let mut full: Option<Instant> = None;
+        loop {
+            match self.link.transmit(frame) {
+                Ok(()) => break,
+                Err(TransmitError::QueueFull) => {
+                    if full.get_or_insert_with(Instant::now).elapsed() > STUCK {
+                        return Err(PlayError::Stuck);
+                    }
+                    self.idle(RETRY)?;
+                }
+                Err(TransmitError::Offline) => {
+                    // The link knows the reason, if there is one, and tells it when waited for.
+                    self.link.wait(Duration::ZERO)?;
+                    return Err(PlayError::Offline);
+                }
+            }
+        }
+        self.played.waited += u64::from(full.is_some());
+        Ok(())
+    }
+
+    /// Lets time pass, and with it the frames of others: who plays does not listen, but what is not taken piles up.
+    fn idle(&mut self, time: Duration) -> Result<(), PlayError> {
+        let begun = Instant::now();
+        loop {
+            let left = time.saturating_sub(begun.elapsed());
+            self.link.wait(left)?;
+            for _ in 0..BATCH {
+                if self.link.take().is_none() {
+                    break;
+                }
+            }
+            if begun.elapsed() >= time {
+                return Ok(());
+            }
+        }
+    }
+}

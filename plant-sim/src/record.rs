@@ -1,0 +1,111 @@
+//! Observers that keep a run: its trace, its truth, and how far it is.
+
+use std::io::{self, Write};
+use std::time::Instant;
+
+use protocol::frame::CanFrame;
+use sim::operator::Hand;
+use sim::rig::{Observer, Truth};
+use trace::{Interface, LogHash, Writer};
+
+/// Every frame, as `candump -L` writes it.
+pub struct TraceLog<W: Write>(Writer<W>);
+
+impl<W: Write> TraceLog<W> {
+    /// An empty log that goes into `sink`.
+    pub fn new(sink: W) -> Self {
+        Self(Writer::new(sink, Interface::CAN0))
+    }
+
+    /// The sink, flushed, and the hash of the log.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn finish(self) -> io::Result<(W, LogHash)> {
+        self.0.finish()
+    }
+}
+
+impl<W: Write> Observer for TraceLog<W> {
+    fn frame(&mut self, time: u64, frame: &CanFrame) -> io::Result<()> {
+        self.0.frame(time / 1000, frame)
+    }
+}
+
+const TRUTH_HEADER: &str = "t,q1,q2,q3,q4,qd1,qd2,qd3,qd4,rq1,rq2,rq3,rq4,rqd1,rqd2,rqd3,rqd4,\
+                            tau1,tau2,tau3,tau4,x,y,z,yaw\n";
+
+/// One row a sample of what the robot did and was to do.
+pub struct TruthLog<W: Write>(W);
+
+impl<W: Write> TruthLog<W> {
+    /// A table with its header that goes into `sink`.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn new(mut sink: W) -> io::Result<Self> {
+        sink.write_all(TRUTH_HEADER.as_bytes())?;
+        Ok(Self(sink))
+    }
+
+    /// The sink, flushed.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.0.flush()?;
+        Ok(self.0)
+    }
+}
+
+impl<W: Write> Observer for TruthLog<W> {
+    fn sample(&mut self, truth: &Truth) -> io::Result<()> {
+        // A third of the run's time would go into the standard library's shortest digits.
+        let mut digits = zmij::Buffer::new();
+        self.0.write_all(digits.format(truth.t).as_bytes())?;
+        for group in [
+            &truth.q,
+            &truth.qd,
+            &truth.rq,
+            &truth.rqd,
+            &truth.tau,
+            &truth.tool,
+        ] {
+            for value in group {
+                self.0.write_all(b",")?;
+                self.0.write_all(digits.format(*value).as_bytes())?;
+            }
+        }
+        self.0.write_all(b"\n")
+    }
+}
+
+/// Says on standard error how far a long run is.
+pub struct Progress {
+    total: u32,
+    done: u32,
+    shown: Instant,
+}
+
+impl Progress {
+    /// At the start of so many cycles.
+    pub fn new(total: u32) -> Self {
+        Self {
+            total,
+            done: 0,
+            shown: Instant::now(),
+        }
+    }
+}
+
+impl Observer for Progress {
+    fn hand(&mut self, hand: &Hand) {
+        if matches!(hand, Hand::EndCycle) {
+            self.done += 1;
+            if self.shown.elapsed().as_secs() >= 2 {
+                self.shown = Instant::now();
+                eprintln!("cycle {} of {}", self.done, self.total);
+            }
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! Bus traces as candump logs, one frame a line: what the bench writes, can-utils reads, and the other way round.
+//!
+//! ```text
+//! (0000000012.345678) can0 1C0##1000102...        FD with bit rate switch
+//! (0000000012.345801) can0 18FF1234#DEADBEEF      29-bit identifier
+//! (0000000012.346000) can0 123#R4                 remote frame
+//! (0000000012.346500) can0 20000080#0000000000000000   error frame
+//! ```
+//!
+//! Three identifier digits are an 11-bit identifier, eight a 29-bit one or, with 0x20000000, an error frame as SocketCAN
+//! reports it. `##` introduces an FD frame, its first digit holds the flags.
+
+#![forbid(unsafe_code)]
+
+pub mod convert;
+pub mod dbc;
+pub mod decode;
+pub mod fields;
+mod line;
+mod reader;
+pub mod stats;
+mod writer;
+
+use std::fmt;
+
+use protocol::frame::CanFrame;
+
+pub use line::Problem;
+pub use reader::{ReadError, Reader};
+pub use writer::Writer;
+
+/// Bit of an identifier that marks an error frame (SocketCAN, `CAN_ERR_FLAG`).
+const ERROR_FLAG: u32 = 0x2000_0000;
+/// Flag digit of an FD frame: bit rate switch (`CANFD_BRS`).
+const FLAG_BRS: u8 = 0x1;
+/// Flag digit of an FD frame: error state indicator (`CANFD_ESI`).
+const FLAG_ESI: u8 = 0x2;
+/// Flag digit of an FD frame: it is one (`CANFD_FDF`). Newer kernels set it; `##` says it already.
+const FLAG_FDF: u8 = 0x4;
+
+/// One line of a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// When, us from an origin that the log does not tell.
+    pub time_us: u64,
+    /// Where.
+    pub interface: Interface,
+    /// What.
+    pub entry: Entry,
+}
+
+/// What a line reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// A frame that was received.
+    Frame(CanFrame),
+    /// A state or error that a controller reported; nothing that was on the bus.
+    Error(ErrorFrame),
+}
+
+/// Error frame of SocketCAN.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ErrorFrame {
+    /// Error classes, a bit set of 29 bits (`linux/can/error.h`).
+    pub class: u32,
+    /// Details, as the classes lay down.
+    pub data: [u8; 8],
+}
+
+/// Name of a CAN interface: 1 to 15 printable ASCII characters without blanks, as Linux has it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Interface {
+    name: [u8; Self::MAX],
+    len: u8,
+}
+
+impl Interface {
+    /// Longest name, bytes (`IFNAMSIZ` less the terminating zero).
+    pub const MAX: usize = 15;
+
+    /// The name that the simulated bus goes by.
+    pub const CAN0: Self = Self {
+        name: *b"can0\0\0\0\0\0\0\0\0\0\0\0",
+        len: 4,
+    };
+
+    /// The name, or `None` if no interface can have it.
+    #[must_use]
+    pub fn new(name: &str) -> Option<Self> {
+        Self::from_bytes(name.as_bytes())
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        if bytes.is_empty() || !bytes.iter().all(u8::is_ascii_graphic) {
+            return None;
+        }
+        let mut name = [0; Self::MAX];
+        name.get_mut(..bytes.len())?.copy_from_slice(bytes);
+        Some(Self {
+            name,
+            len: bytes.len() as u8,
+        })
+    }
+
+    fn as_bytes(&self) -> &[u8] {
+        &self.name[..usize::from(self.len)]
+    }
+}
+
+impl fmt::Display for Interface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Printable ASCII by construction.
+        self.as_bytes()
+            .iter()
+            .try_for_each(|&byte| fmt::Write::write_char(f, char::from(byte)))
+    }
+}
+
+impl fmt::Debug for Interface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// SHA-256 of a log; `Display` gives the hex digits that `sha256sum` gives for the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LogHash(pub [u8; 32]);
+
+impl fmt::Display for LogHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}

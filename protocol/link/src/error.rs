@@ -1,0 +1,104 @@
+//! Why a link cannot be used, with what to do about it.
+
+use std::fmt;
+use std::io;
+
+/// Why a link cannot be used, or not any more.
+#[derive(Debug)]
+pub enum LinkError {
+    /// The system has no such network interface.
+    NoInterface {
+        /// Name asked for.
+        name: String,
+        /// CAN interfaces there are, separated by blanks.
+        present: String,
+    },
+    /// The network interface is not a CAN interface.
+    NotCan {
+        /// Name.
+        name: String,
+    },
+    /// The interface carries classical frames only.
+    ClassicalOnly {
+        /// Name.
+        name: String,
+        /// Its MTU, bytes: 16 for classical CAN, 72 for CAN FD.
+        mtu: u32,
+    },
+    /// The interface is down.
+    Down {
+        /// Name.
+        name: String,
+    },
+    /// The other end of the serial line has gone.
+    Closed {
+        /// Terminal or TCP address.
+        peer: String,
+    },
+    /// The operating system refused something else.
+    Io {
+        /// What was attempted, on what.
+        what: String,
+        /// Its answer.
+        source: io::Error,
+    },
+}
+
+impl LinkError {
+    pub(crate) fn io(what: impl Into<String>, source: impl Into<io::Error>) -> Self {
+        Self::Io {
+            what: what.into(),
+            source: source.into(),
+        }
+    }
+}
+
+impl fmt::Display for LinkError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoInterface { name, present } => {
+                write!(f, "there is no interface {name}; CAN interfaces here: ")?;
+                f.write_str(if present.is_empty() { "none" } else { present })?;
+                if name.starts_with("vcan") {
+                    write!(
+                        f,
+                        ". Add it with: ip link add dev {name} type vcan && ip link set {name} mtu 72 up"
+                    )?;
+                }
+                Ok(())
+            }
+            Self::NotCan { name } => write!(f, "{name} is not a CAN interface"),
+            Self::ClassicalOnly { name, mtu } => {
+                write!(
+                    f,
+                    "{name} carries classical CAN only (MTU {mtu}), CAN FD needs MTU 72. "
+                )?;
+                if name.starts_with("vcan") {
+                    write!(
+                        f,
+                        "Set it with: ip link set {name} down && ip link set {name} mtu 72 up"
+                    )
+                } else {
+                    write!(
+                        f,
+                        "If its controller can FD: ip link set {name} type can bitrate 1000000 dbitrate 5000000 fd on"
+                    )
+                }
+            }
+            Self::Down { name } => {
+                write!(f, "{name} is down; bring it up with: ip link set {name} up")
+            }
+            Self::Closed { peer } => write!(f, "{peer} has closed the connection"),
+            Self::Io { what, source } => write!(f, "cannot {what}: {source}"),
+        }
+    }
+}
+
+impl core::error::Error for LinkError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Io { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}

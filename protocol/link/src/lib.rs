@@ -1,0 +1,144 @@
+//! Ends of a CAN bus on a Linux host: SocketCAN and serial-line adapters (slcan).
+//!
+//! A [`Link`] is a [`Bus`] that can also be waited for. A person names one as text, a [`LinkAddress`]. The crate leans on
+//! [`protocol`] alone; what frames mean is not its business. A Feedback frame that arrives on vcan0 is read by
+//! [`SocketCan`], stamped by the kernel ([`Stamped`]), and taken by the controller's process through [`Bus::receive`];
+//! the Command goes out through [`Bus::transmit`]. The programs that need a thread of real-time priority or a sleep until
+//! an instant find them in [`realtime`].
+
+#![forbid(unsafe_code)]
+
+mod address;
+mod error;
+pub mod realtime;
+mod slcan_hub;
+mod slcan_port;
+mod socketcan;
+mod stamped;
+
+use std::io;
+use std::os::fd::AsFd;
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+pub use address::{AddressError, LinkAddress, SlcanPeer};
+pub use error::LinkError;
+pub use slcan_hub::{Clients, SlcanHub};
+pub use slcan_port::SlcanPort;
+pub use socketcan::SocketCan;
+pub use stamped::Stamped;
+
+use protocol::bus::{Bus, TransmitError};
+use protocol::frame::CanFrame;
+
+/// An open link to a bus.
+#[derive(Debug)]
+pub enum Link {
+    /// A network interface.
+    SocketCan(SocketCan),
+    /// A serial line.
+    Slcan(Box<SlcanPort>),
+    /// The serial lines of whoever connects.
+    SlcanHub(SlcanHub),
+}
+
+impl Link {
+    /// Opens the link and takes part in its bus. A node's own frames are never received.
+    ///
+    /// # Errors
+    /// See [`LinkError`].
+    pub fn open(address: &LinkAddress) -> Result<Self, LinkError> {
+        match address {
+            LinkAddress::SocketCan(interface) => SocketCan::open(interface).map(Self::SocketCan),
+            LinkAddress::Slcan(SlcanPeer::Listen(server)) => {
+                SlcanHub::bind(server, Clients::TakePart).map(Self::SlcanHub)
+            }
+            LinkAddress::Slcan(peer) => {
+                SlcanPort::open(peer).map(|port| Self::Slcan(Box::new(port)))
+            }
+        }
+    }
+
+    /// Waits until a frame may be taken or `timeout` is over; `true` if there is something to take. A signal ends the
+    /// wait early, as if the time were over.
+    ///
+    /// # Errors
+    /// The link has failed and will not carry frames any more; open it again.
+    pub fn wait(&mut self, timeout: Duration) -> Result<bool, LinkError> {
+        if let Some(failure) = self.take_failure() {
+            return Err(failure);
+        }
+        let ready = match self {
+            Self::SocketCan(link) => link.ready(timeout)?,
+            Self::Slcan(link) => link.ready(timeout)?,
+            Self::SlcanHub(link) => link.ready(timeout)?,
+        };
+        self.take_failure().map_or(Ok(ready), Err)
+    }
+
+    /// The oldest frame received and not yet taken, with its time of arrival.
+    pub fn take(&mut self) -> Option<Stamped> {
+        match self {
+            Self::SocketCan(link) => link.take(),
+            Self::Slcan(link) => link.take(),
+            Self::SlcanHub(link) => link.take(),
+        }
+    }
+
+    /// Bytes of frames taken by [`transmit`](Bus::transmit) that this process still holds; what is left when the link is
+    /// dropped is never sent. They go out while the link is waited for.
+    #[must_use]
+    pub fn unsent(&self) -> usize {
+        match self {
+            Self::SocketCan(_) => 0,
+            Self::Slcan(link) => link.unsent(),
+            Self::SlcanHub(link) => link.unsent(),
+        }
+    }
+
+    fn take_failure(&mut self) -> Option<LinkError> {
+        match self {
+            Self::SocketCan(link) => link.failure.take(),
+            Self::Slcan(link) => link.failure.take(),
+            // Clients come and go.
+            Self::SlcanHub(_) => None,
+        }
+    }
+}
+
+impl Bus for Link {
+    fn receive(&mut self) -> Option<CanFrame> {
+        self.take().map(|stamped| stamped.frame)
+    }
+
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        match self {
+            Self::SocketCan(link) => link.transmit(frame),
+            Self::Slcan(link) => link.transmit(frame),
+            Self::SlcanHub(link) => link.transmit(frame),
+        }
+    }
+}
+
+/// Waits for input on a descriptor, and for room for output if asked to.
+fn poll_for(descriptor: impl AsFd, output: bool, timeout: Duration) -> io::Result<bool> {
+    let mut events = PollFlags::IN;
+    if output {
+        events |= PollFlags::OUT;
+    }
+    poll_all(&mut [PollFd::new(&descriptor, events)], timeout)
+}
+
+/// Waits for an event on any of the descriptors. A signal ends the wait.
+fn poll_all(descriptors: &mut [PollFd<'_>], timeout: Duration) -> io::Result<bool> {
+    let timeout = Timespec::try_from(timeout).unwrap_or(Timespec {
+        tv_sec: 1,
+        tv_nsec: 0,
+    });
+    match poll(descriptors, Some(&timeout)) {
+        Ok(ready) => Ok(ready > 0),
+        Err(rustix::io::Errno::INTR) => Ok(false),
+        Err(error) => Err(error.into()),
+    }
+}

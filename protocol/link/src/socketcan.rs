@@ -1,0 +1,194 @@
+//! SocketCAN: any CAN interface of Linux, virtual or hardware, by one code.
+
+use std::fs;
+use std::io;
+use std::time::{Duration, SystemTime};
+
+use ::socketcan::{
+    CanAnyFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Frame as _, Socket, SocketOptions,
+};
+use rustix::io::Errno;
+
+use super::{LinkError, Stamped, poll_for};
+use protocol::bus::TransmitError;
+use protocol::frame::{CanFrame, FrameKind};
+
+/// `ARPHRD_CAN`: kind of network interface, as `/sys/class/net/NAME/type` has it.
+const ARPHRD_CAN: u32 = 280;
+/// `IFF_UP`: the interface is administratively up.
+const IFF_UP: u32 = 1;
+/// `CANFD_MTU`: an interface with less carries classical frames only.
+const CANFD_MTU: u32 = 72;
+/// Error classes that say whether the controller takes part in the bus (`linux/can/error.h`).
+const CAN_ERR_BUSOFF: u32 = 0x40;
+const CAN_ERR_RESTARTED: u32 = 0x100;
+
+/// A socket on a CAN interface. Local loopback stays on, so that other programs of this machine see what it sends; its
+/// own frames do not come back.
+#[derive(Debug)]
+pub struct SocketCan {
+    socket: CanFdSocket,
+    interface: String,
+    bus_off: bool,
+    pub(super) failure: Option<LinkError>,
+}
+
+impl SocketCan {
+    /// Opens an interface that is up and carries FD frames.
+    ///
+    /// # Errors
+    /// There is none, it is down, or it cannot carry FD frames: [`LinkError`] says what to do.
+    pub fn open(interface: &str) -> Result<Self, LinkError> {
+        let name = || interface.to_string();
+        let Some(kind) = property(interface, "type") else {
+            return Err(LinkError::NoInterface {
+                name: name(),
+                present: can_interfaces(),
+            });
+        };
+        if kind != ARPHRD_CAN {
+            return Err(LinkError::NotCan { name: name() });
+        }
+        let mtu = property(interface, "mtu").unwrap_or(0);
+        if mtu < CANFD_MTU {
+            return Err(LinkError::ClassicalOnly { name: name(), mtu });
+        }
+        if property(interface, "flags").unwrap_or(0) & IFF_UP == 0 {
+            return Err(LinkError::Down { name: name() });
+        }
+        let socket = open_socket(interface)
+            .map_err(|source| LinkError::io(format!("open {interface}"), source))?;
+        Ok(Self {
+            socket,
+            interface: name(),
+            bus_off: false,
+            failure: None,
+        })
+    }
+
+    pub(super) fn ready(&mut self, timeout: Duration) -> Result<bool, LinkError> {
+        poll_for(&self.socket, false, timeout)
+            .map_err(|source| LinkError::io(format!("wait for {}", self.interface), source))
+    }
+
+    pub(super) fn take(&mut self) -> Option<Stamped> {
+        loop {
+            let (frame, at) = match self.socket.read_frame_with_timestamps() {
+                Ok((frame, times)) => (frame, times.socket.unwrap_or_else(SystemTime::now)),
+                Err(error) => {
+                    self.judge(&error, "read from");
+                    return None;
+                }
+            };
+            match &frame {
+                CanAnyFrame::Error(error) => {
+                    let class = error.id_word();
+                    if class & CAN_ERR_BUSOFF != 0 {
+                        self.bus_off = true;
+                    }
+                    if class & CAN_ERR_RESTARTED != 0 {
+                        self.bus_off = false;
+                    }
+                }
+                _ => {
+                    if let Some(frame) = from_socketcan(&frame) {
+                        return Some(Stamped { frame, at });
+                    }
+                }
+            }
+        }
+    }
+
+    pub(super) fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        if self.bus_off || self.failure.is_some() {
+            return Err(TransmitError::Offline);
+        }
+        let written = match frame.kind() {
+            FrameKind::Classical { .. } => frame
+                .to_embedded::<::socketcan::CanFrame>()
+                .map(|frame| self.socket.write_frame(&frame)),
+            FrameKind::Fd { brs, esi } => {
+                CanFdFrame::new(frame.id(), frame.data()).map(|mut frame| {
+                    frame.set_brs(brs);
+                    frame.set_esi(esi);
+                    self.socket.write_frame(&frame)
+                })
+            }
+        };
+        match written {
+            Some(Ok(())) => Ok(()),
+            Some(Err(error)) => Err(self.judge(&error, "write to")),
+            // Every CanFrame has an equal there.
+            None => Err(TransmitError::Offline),
+        }
+    }
+
+    /// What an error of the socket means for a sender; one that ends the link is kept.
+    fn judge(&mut self, error: &io::Error, what: &str) -> TransmitError {
+        match error.raw_os_error().map(Errno::from_raw_os_error) {
+            // Queue of the interface, buffer of the socket: full is full.
+            Some(Errno::NOBUFS | Errno::AGAIN) => TransmitError::QueueFull,
+            Some(Errno::INTR) => TransmitError::QueueFull,
+            Some(Errno::NETDOWN) => {
+                self.failure = Some(LinkError::Down {
+                    name: self.interface.clone(),
+                });
+                TransmitError::Offline
+            }
+            Some(Errno::NODEV | Errno::NXIO) => {
+                self.failure = Some(LinkError::NoInterface {
+                    name: self.interface.clone(),
+                    present: can_interfaces(),
+                });
+                TransmitError::Offline
+            }
+            code => {
+                let source = code.map_or_else(|| io::Error::from(error.kind()), io::Error::from);
+                self.failure = Some(LinkError::io(format!("{what} {}", self.interface), source));
+                TransmitError::Offline
+            }
+        }
+    }
+}
+
+fn open_socket(interface: &str) -> io::Result<CanFdSocket> {
+    let socket = CanFdSocket::open(interface)?;
+    socket.set_nonblocking(true)?;
+    socket.set_loopback(true)?;
+    socket.set_recv_own_msgs(false)?;
+    socket.set_recv_timestamp(true)?;
+    socket.set_error_filter(CAN_ERR_BUSOFF | CAN_ERR_RESTARTED)?;
+    Ok(socket)
+}
+
+fn from_socketcan(frame: &CanAnyFrame) -> Option<CanFrame> {
+    match frame {
+        CanAnyFrame::Normal(frame) => CanFrame::from_embedded(frame),
+        CanAnyFrame::Remote(frame) => CanFrame::from_embedded(frame),
+        CanAnyFrame::Fd(frame) => CanFrame::fd(frame.id(), frame.data(), frame.is_brs())
+            .map(|fd| fd.with_esi(frame.is_esi())),
+        CanAnyFrame::Error(_) => None,
+    }
+}
+
+/// A number that the kernel tells about an interface, decimal or hexadecimal.
+fn property(interface: &str, name: &str) -> Option<u32> {
+    let text = fs::read_to_string(format!("/sys/class/net/{interface}/{name}")).ok()?;
+    let text = text.trim();
+    match text.strip_prefix("0x") {
+        Some(digits) => u32::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
+    }
+}
+
+/// Names of all CAN interfaces.
+fn can_interfaces() -> String {
+    let mut names: Vec<String> = fs::read_dir("/sys/class/net")
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| property(name, "type") == Some(ARPHRD_CAN))
+        .collect();
+    names.sort();
+    names.join(" ")
+}

@@ -1,0 +1,203 @@
+//! Addresses of links, and the serial link against a peer that answers by hand. SocketCAN needs a kernel with CAN:
+//! `tests/ci/10-vcan.sh`.
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::time::Duration;
+
+use link::{Clients, Link, LinkAddress, LinkError, SlcanHub, SlcanPeer};
+use protocol::bus::{Bus, TransmitError};
+use protocol::frame::{CanFrame, ExtendedId, StandardId};
+
+/// Long enough for any machine; reached only when a test fails.
+const LIMIT: Duration = Duration::from_secs(20);
+
+fn adapter() -> (Link, TcpStream) {
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = SlcanPeer::Tcp(server.local_addr().unwrap().to_string());
+    let link = Link::open(&LinkAddress::Slcan(address)).unwrap();
+    let (peer, _) = server.accept().unwrap();
+    peer.set_read_timeout(Some(LIMIT)).unwrap();
+    (link, peer)
+}
+
+fn read(peer: &mut TcpStream, expected: &[u8]) {
+    let mut buffer = vec![0; expected.len()];
+    peer.read_exact(&mut buffer).unwrap();
+    assert_eq!(
+        String::from_utf8_lossy(&buffer),
+        String::from_utf8_lossy(expected)
+    );
+}
+
+const OPENING: &[u8] = b"\rC\rS8\rY5\rO\r";
+
+#[test]
+fn addresses_read_back_as_they_were_written() {
+    for text in [
+        "socketcan:can0",
+        "socketcan:vcan0",
+        "slcan:/dev/ttyACM0",
+        "slcan:tcp:localhost:29536",
+        "slcan:tcp:[::1]:1",
+        "slcan:listen:0.0.0.0:29536",
+    ] {
+        let address: LinkAddress = text.parse().unwrap();
+        assert_eq!(address.to_string(), text);
+    }
+}
+
+#[test]
+fn what_is_no_address_is_refused_with_the_allowed_forms() {
+    for text in [
+        "",
+        "can0",
+        "socketcan:",
+        "socketcan:../../etc",
+        "socketcan:a name",
+        "socketcan:sixteen-bytes-xx",
+        "slcan:",
+        "slcan:tcp:",
+        "slcan:tcp:host",
+        "slcan:listen:",
+        "slcan:tcp::1",
+        "slcan:tcp:host:65536",
+        "udp:1",
+    ] {
+        let message = text.parse::<LinkAddress>().unwrap_err().to_string();
+        assert!(message.contains("socketcan:INTERFACE"), "{message}");
+    }
+}
+
+#[test]
+fn interfaces_that_are_none_are_named() {
+    let open = |name: &str| Link::open(&LinkAddress::SocketCan(name.into())).unwrap_err();
+    assert!(matches!(open("nosuch0"), LinkError::NoInterface { name, .. } if name == "nosuch0"));
+    // Every Linux has a loopback interface, and it is not CAN.
+    assert!(matches!(open("lo"), LinkError::NotCan { name } if name == "lo"));
+}
+
+#[test]
+fn serial_link_opens_its_adapter_and_carries_frames_both_ways() {
+    let (mut link, mut peer) = adapter();
+    read(&mut peer, OPENING);
+
+    let fd = CanFrame::fd(StandardId::new(0x1C0).unwrap(), &[0xA5; 24], true).unwrap();
+    let classical = CanFrame::classical(ExtendedId::new(0x123).unwrap(), &[1, 2]).unwrap();
+    link.transmit(&fd).unwrap();
+    link.transmit(&classical).unwrap();
+    let mut expected = b"b1C0C".to_vec();
+    expected.extend(b"A5".repeat(24));
+    expected.extend(b"\rT0000012320102\r");
+    read(&mut peer, &expected);
+
+    // Acknowledgements, a refusal and noise around two frames, the second in two pieces.
+    assert_eq!(link.receive(), None);
+    peer.write_all(b"\r\rz\r\x07garbage\rt24021122\rb1C0")
+        .unwrap();
+    assert!(link.wait(LIMIT).unwrap());
+    let first = CanFrame::classical(StandardId::new(0x240).unwrap(), &[0x11, 0x22]).unwrap();
+    assert_eq!(link.receive(), Some(first));
+    peer.write_all(&expected[4..]).unwrap();
+    let mut second = link.receive();
+    while second.is_none() {
+        assert!(link.wait(LIMIT).unwrap());
+        second = link.receive();
+    }
+    assert_eq!(second, Some(fd));
+    let Link::Slcan(port) = &link else {
+        unreachable!("opened as slcan");
+    };
+    assert_eq!(port.refused(), 1);
+}
+
+#[test]
+fn a_peer_that_does_not_read_fills_the_queue_and_never_blocks() {
+    let (mut link, _peer) = adapter();
+    let frame = CanFrame::fd(StandardId::new(1).unwrap(), &[0; 64], true).unwrap();
+    // The kernel's socket buffers are finite: some megabytes are more than enough.
+    let refused = (0..1_000_000).find_map(|_| link.transmit(&frame).err());
+    assert_eq!(refused, Some(TransmitError::QueueFull));
+}
+
+#[test]
+fn a_peer_that_has_gone_is_reported() {
+    let (mut link, peer) = adapter();
+    drop(peer);
+    let failure = loop {
+        match link.wait(LIMIT) {
+            Ok(_) => assert_eq!(link.receive(), None),
+            Err(failure) => break failure,
+        }
+    };
+    assert!(matches!(failure, LinkError::Closed { .. }), "{failure}");
+}
+
+fn hub(may: Clients) -> (SlcanHub, LinkAddress) {
+    let hub = SlcanHub::bind("127.0.0.1:0", may).unwrap();
+    let address = SlcanPeer::Tcp(hub.local_address().unwrap().to_string());
+    (hub, LinkAddress::Slcan(address))
+}
+
+/// Lets the hub work until the link has a frame.
+fn carried(hub: &mut SlcanHub, link: &mut Link) -> CanFrame {
+    loop {
+        hub.exchange();
+        if link.wait(Duration::from_millis(1)).unwrap() {
+            return link.receive().unwrap();
+        }
+    }
+}
+
+#[test]
+fn what_one_client_of_a_hub_sends_all_others_receive_and_nobody_twice() {
+    let (hub, address) = hub(Clients::TakePart);
+    let mut links = [0, 1, 2].map(|_| Link::open(&address).unwrap());
+    let frame = |id| CanFrame::fd(StandardId::new(id).unwrap(), &[id as u8; 48], true).unwrap();
+    for link in &mut links {
+        link.transmit(&frame(7)).unwrap();
+    }
+    // Once the hub has a client's frame it has its opening, and all three hear the next frame.
+    let mut link = Link::SlcanHub(hub);
+    for _ in 0..3 {
+        while !link.wait(LIMIT).unwrap() {}
+        assert_eq!(link.receive(), Some(frame(7)));
+    }
+    let Link::SlcanHub(mut hub) = link else {
+        unreachable!("made so");
+    };
+    hub.transmit(&frame(6)).unwrap();
+    for link in &mut links {
+        while carried(&mut hub, link) != frame(6) {}
+    }
+    let [first, second, third] = &mut links;
+    first.transmit(&frame(8)).unwrap();
+    assert_eq!(carried(&mut hub, second), frame(8));
+    assert_eq!(carried(&mut hub, third), frame(8));
+    hub.transmit(&frame(9)).unwrap();
+    // The sender's own frame did not come back: the next that it hears is the hub's.
+    assert_eq!(carried(&mut hub, first), frame(9));
+}
+
+#[test]
+fn a_hub_to_watch_refuses_frames_and_answers_like_an_adapter() {
+    let (mut hub, address) = hub(Clients::Watch);
+    let LinkAddress::Slcan(SlcanPeer::Tcp(server)) = &address else {
+        unreachable!("made so");
+    };
+    let mut peer = TcpStream::connect(server).unwrap();
+    // As python-can opens a bus.
+    peer.write_all(b"C\rS8\r\rO\rV\rN\rt1230\r?\r").unwrap();
+    peer.set_nonblocking(true).unwrap();
+    let expected = b"\r\r\r\rV1010\r\x07\x07\x07";
+    let mut answer: Vec<u8> = Vec::new();
+    while answer.len() < expected.len() {
+        hub.exchange();
+        let mut buffer = [0; 64];
+        match peer.read(&mut buffer) {
+            Ok(count) => answer.extend(&buffer[..count]),
+            Err(error) => assert_eq!(error.kind(), std::io::ErrorKind::WouldBlock),
+        }
+    }
+    assert_eq!(answer, expected);
+}
