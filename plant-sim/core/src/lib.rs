@@ -2,6 +2,7 @@
 
 #![forbid(unsafe_code)]
 
+mod allowed;
 pub mod bus;
 mod convert;
 pub mod drives;
@@ -16,3 +17,4 @@ pub mod scenario;
 pub mod selection;
 pub mod setup;
 pub mod summary;
+mod text;

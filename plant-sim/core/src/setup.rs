@@ -8,7 +8,7 @@ use crate::model::RobotModel;
 use crate::plant::arm::Arm;
 use crate::plant::kinematics::{Pose, inverse};
 use crate::rig::{self, RigConfig};
-use crate::scenario::{Scenario, Step};
+use crate::scenario::{Scenario, ScenarioError, Step};
 
 /// What to run with what.
 #[derive(Clone, Debug)]
@@ -24,6 +24,9 @@ pub struct RunConfig {
 /// Why a run cannot begin.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
+    /// The scenario asks for what this robot cannot do.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
     /// The start of the scenario is outside the robot's workspace.
     #[error(
         "scenario {scenario}: the start pose x {x}, y {y}, z {z}, yaw {yaw} is outside the workspace of {robot}"
@@ -76,6 +79,7 @@ impl RunConfig {
     /// The robot cannot start there, the controller not work with it, or the bus not carry the messages.
     pub fn rig(&self) -> Result<RigConfig, SetupError> {
         let scenario = &self.scenario;
+        scenario.check_with(&self.nominal)?;
         let nominal = ArmModel::from(&self.nominal);
         nominal.validate().map_err(|source| SetupError::Model {
             robot: self.nominal.name.clone(),

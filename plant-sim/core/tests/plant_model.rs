@@ -89,7 +89,7 @@ fn every_mistake_is_named_with_its_place_and_what_is_allowed() {
     ];
     for (from, to, expected) in cases {
         let message = refusal(&edited(from, to));
-        let place = format!("line {}: ", line_of(from));
+        let place = format!("line {}, column ", line_of(from));
         assert!(
             message.starts_with(&place) && message.contains(expected),
             "{message}\nshould be at {place}{expected}"
@@ -103,37 +103,143 @@ fn what_is_missing_is_named_with_the_line_of_its_object() {
     let place = line_of(r#""drive": {"#);
     assert_eq!(
         message,
-        format!("line {place}: drive.screw_hand_sign is missing; it must be a finite number")
+        format!(
+            "line {place}, column 12: drive.screw_hand_sign is missing; it must be a finite number"
+        )
     );
     assert_eq!(
         refusal("{}"),
-        "line 1: dh is missing; it must be the Denavit-Hartenberg table"
+        "line 1, column 1: dh is missing; it must be the Denavit-Hartenberg table"
     );
     assert_eq!(
         refusal("[]"),
-        "line 1: the document is an array of 0; it must be a JSON object"
+        "line 1, column 1: the document is an array of 0; it must be a JSON object"
     );
-    assert!(refusal("{\n\"a\": }").starts_with("line 2: not JSON: "));
-    assert!(refusal("").starts_with("line 1: not JSON: "));
+    assert!(refusal("{\n\"a\": }").starts_with("line 2, column 6: not JSON: "));
+    assert!(refusal("").starts_with("line 1, column 0: not JSON: "));
 }
 
 #[test]
-fn the_place_survives_escapes_nesting_and_repeated_keys() {
-    // Text with quotes and brackets in front, and a first "dh" that the parser lets the second one replace.
-    let text = "{\"note\": \"a \\\" ] } , dh\", \"dh\": {\"a1\": [{}, 1]},\n\"dh\":\n{\"alpha\": [0, 3.141592653589793, 0, 0],\n\"a1\": true}}";
+fn the_place_survives_escapes_and_nesting() {
+    // Text with quotes and brackets in front.
+    let text = "{\"note\": \"a \\\" ] } , dh\", \"gh\": {\"a1\": [{}, 1]},\n\"dh\":\n{\"alpha\": [0, 3.141592653589793, 0, 0],\n\"a1\": true}}";
     assert_eq!(
         refusal(text),
-        "line 4: dh.a1 is true; it must be a number > 0"
+        "line 4, column 7: dh.a1 is true; it must be a number > 0, at most 10 m"
     );
 }
 
+/// Which of two was meant cannot be known.
 #[test]
-fn unknown_keys_are_tolerated() {
+fn keys_that_stand_twice_are_refused() {
+    for (from, to) in [
+        (r#""a1": 0.56"#, r#""a1": 0.56, "a1": 0.4"#),
+        (r#""units""#, r#""drive": {}, "units""#),
+    ] {
+        let message = refusal(&edited(from, to));
+        assert!(message.contains("stands twice in one object"), "{message}");
+    }
+}
+
+#[test]
+fn unknown_keys_are_warned_of_with_the_nearest_known_one() {
     let text = edited(r#""units""#, r#""comment": {"any": [1, "thing"]}, "units""#);
     assert_eq!(
         RobotModel::from_json(&text).unwrap(),
         (RobotModel::irb_930_22_105(), vec![])
     );
+    for (from, to, expected) in [
+        (
+            r#""units""#,
+            r#""foo": 1, "units""#,
+            "foo is not known and not used",
+        ),
+        (
+            r#""viscous""#,
+            r#""viskous": 1, "viscous""#,
+            "drive.viskous is not known and not used; did you mean viscous?",
+        ),
+        (
+            r#""mass": 14.5"#,
+            r#""mass": 14.5, "Mass": 14"#,
+            "links[1].Mass is not known and not used; did you mean mass?",
+        ),
+    ] {
+        let (model, warnings) = RobotModel::from_json(&edited(from, to)).unwrap();
+        assert_eq!(model, RobotModel::irb_930_22_105());
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        assert!(warnings[0].ends_with(expected), "{warnings:?}");
+    }
+}
+
+#[test]
+fn physics_that_no_robot_has_is_refused() {
+    for (from, to, expected) in [
+        // Moments of inertia of no body.
+        (
+            r#""inertia_com_diag": [0.053, 0.53, 0.55]"#,
+            r#""inertia_com_diag": [0.053, 0.53, 5.0]"#,
+            "links[0].inertia_com_diag[2] is 5.0; it must be at most the sum of the other two moments",
+        ),
+        // Other units, one by one and all at once.
+        (
+            r#""a1": 0.56"#,
+            r#""a1": 560"#,
+            "dh.a1 is 560; it must be a number > 0, at most 10 m; lengths are in m: 560 mm are 0.56",
+        ),
+        (
+            r#"0.3, 6.98"#,
+            r#"300, 6.98"#,
+            "joint_limits.upper[2] is 300; it must be a number from -10 to 10 m; lengths are in m",
+        ),
+        (
+            r#"2.530727415391778, 0.3"#,
+            r#"145, 0.3"#,
+            "joint_limits.upper[1] is 145; it must be a number from -20 to 20 rad; angles are in rad: 145 degrees are 2.53",
+        ),
+        (r#""SI: m, kg"#, r#""mm, g"#, "units is "),
+        (
+            r#"[0.2, 0.0, 0.0902]"#,
+            r#"[1e9, 0.0, 0.0902]"#,
+            "links[1].com_joint_frame[0] is 1000000000.0; it must be a number from -10 to 10 m",
+        ),
+        // Links in another order than the frames.
+        (
+            r#""name": "link2""#,
+            r#""name": "link1""#,
+            "links[1].name is \"link1\"; it must be a link 2 here",
+        ),
+        // Peak below continuous.
+        (
+            r#""effort_peak": [640.0"#,
+            r#""effort_peak": [200.0"#,
+            "joint_limits.effort_continuous_rms[0] is 216.0; it must be at most the peak, 200",
+        ),
+        (
+            r#""motor_rated_torque": [3.18"#,
+            r#""motor_rated_torque": [9.0"#,
+            "drive.motor_rated_torque[0] is 9.0; it must be at most the motor's limit, 8 N m",
+        ),
+        // What frames carry.
+        (
+            r#""motor_max_speed_rad_s": [628.3"#,
+            r#""motor_max_speed_rad_s": [6283"#,
+            "drive.motor_max_speed_rad_s[0] is 6283; it must be a number > 0, at most 1600 rad/s",
+        ),
+        (": 131072", ": 1", "it must be a whole number from 256"),
+        // 2^26 counts x 33.3 turns to the limit are more than 32 bits.
+        (
+            ": 131072",
+            ": 67108864",
+            "the motor of the shoulder makes 33.3 turns to its limit",
+        ),
+    ] {
+        let message = refusal(&edited(from, to));
+        assert!(
+            message.contains(expected),
+            "{message}\nshould say {expected}"
+        );
+    }
 }
 
 #[test]
@@ -192,5 +298,33 @@ fn a_payload_may_be_a_point_but_not_less_than_nothing() {
         }
     );
     let message = Payload::from_json(&text(-2.0)).unwrap_err().to_string();
-    assert_eq!(message, "line 1: mass is -2; it must be a number >= 0");
+    assert_eq!(
+        message,
+        "line 1, column 10: mass is -2; it must be a number >= 0, at most 100 kg"
+    );
+}
+
+#[test]
+fn payloads_of_no_body_are_refused() {
+    for (text, expected) in [
+        (
+            r#"{"mass": 2, "com_flange_frame": [0, 0, 0.05], "inertia_com_diag": [0, 0, 1]}"#,
+            "inertia_com_diag[2] is 1; it must be at most the sum of the other two moments, 0",
+        ),
+        (
+            r#"{"mass": 2, "com_flange_frame": [0, 0, 50], "inertia_com_diag": [0, 0, 0]}"#,
+            "com_flange_frame[2] is 50; it must be a number from -1 to 1 m; lengths are in m: 50 mm are 0.05",
+        ),
+        (
+            r#"{"mass": 2, "com_flange_frame": [0, 0, 0], "inertia_com_diag": [0, 0, 0], "masss": 3}"#,
+            "masss is not known; did you mean mass?",
+        ),
+        (
+            r#"{"mass": 2, "com_flange_frame": [0, 0, 0, 0], "inertia_com_diag": [0, 0, 0]}"#,
+            "com_flange_frame is an array of 4; it must be an array of 3",
+        ),
+    ] {
+        let message = Payload::from_json(text).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
+    }
 }

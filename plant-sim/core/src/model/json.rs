@@ -3,38 +3,15 @@
 //! `serde_json` knows lines only while it parses; a missing key or a mass of zero is noticed later. The reader
 //! therefore keeps the path of every value it hands out and looks its line up when, and only when, it must complain.
 
-use super::{ModelError, ModelErrorKind};
-use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fmt;
 
-/// What a number may be.
-#[derive(Clone, Copy)]
-pub(super) enum Allowed {
-    Finite,
-    Positive,
-    NotNegative,
-}
+use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
+use serde_json::Value;
 
-impl Allowed {
-    fn admits(self, number: f64) -> bool {
-        number.is_finite()
-            && match self {
-                Self::Finite => true,
-                Self::Positive => number > 0.0,
-                Self::NotNegative => number >= 0.0,
-            }
-    }
-}
-
-impl fmt::Display for Allowed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Finite => "a finite number",
-            Self::Positive => "a number > 0",
-            Self::NotNegative => "a number >= 0",
-        })
-    }
-}
+use super::{ModelError, ModelErrorKind};
+use crate::allowed::Allowed;
+use crate::text::nearest;
 
 #[derive(Clone)]
 enum Segment {
@@ -50,12 +27,65 @@ pub(super) struct Node<'a> {
     path: Vec<Segment>,
 }
 
-/// Parses `text`; a syntax error names its line.
+/// Parses `text`; an error names its place. A key that stands twice in one object is an error: which of the two was meant
+/// cannot be known.
 pub(super) fn parse(text: &str) -> Result<Value, ModelError> {
-    serde_json::from_str(text).map_err(|error| ModelError {
-        line: Some(error.line()),
+    let refused = |error: serde_json::Error| ModelError {
+        place: Some((error.line(), error.column())),
         cause: ModelErrorKind::Syntax(error.to_string()),
-    })
+    };
+    serde_json::from_str::<NoDoubles>(text).map_err(refused)?;
+    serde_json::from_str(text).map_err(refused)
+}
+
+/// Any JSON in which no object has a key twice.
+struct NoDoubles;
+
+impl<'de> Deserialize<'de> for NoDoubles {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Self)
+    }
+}
+
+macro_rules! accept {
+    ($($visit:ident: $of:ty),*) => {
+        $(fn $visit<E>(self, _: $of) -> Result<Self, E> {
+            Ok(self)
+        })*
+    };
+}
+
+impl<'de> Visitor<'de> for NoDoubles {
+    type Value = Self;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JSON")
+    }
+
+    accept!(visit_bool: bool, visit_i64: i64, visit_u64: u64, visit_f64: f64, visit_str: &str);
+
+    fn visit_unit<E>(self) -> Result<Self, E> {
+        Ok(self)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Self, A::Error> {
+        while sequence.next_element::<Self>()?.is_some() {}
+        Ok(self)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self, A::Error> {
+        let mut keys = BTreeSet::new();
+        while let Some(key) = map.next_key::<String>()? {
+            if keys.contains(&key) {
+                return Err(A::Error::custom(format!(
+                    "{key} stands twice in one object; allowed: once"
+                )));
+            }
+            keys.insert(key);
+            map.next_value::<Self>()?;
+        }
+        Ok(self)
+    }
 }
 
 impl<'a> Node<'a> {
@@ -91,7 +121,7 @@ impl<'a> Node<'a> {
                 expected: expected.to_string(),
             };
             ModelError {
-                line: Some(line_of(self.text, &self.path)),
+                place: Some(place_of(self.text, &self.path)),
                 cause,
             }
         })
@@ -116,10 +146,56 @@ impl<'a> Node<'a> {
 
     /// This value as a number.
     pub(super) fn as_number(&self, allowed: Allowed) -> Result<f64, ModelError> {
-        self.value
-            .as_f64()
-            .filter(|&x| allowed.admits(x))
-            .ok_or_else(|| self.wrong(allowed))
+        match self.value.as_f64() {
+            Some(number) => allowed
+                .check(number)
+                .map_err(|expected| self.wrong(expected)),
+            None => Err(self.wrong(allowed)),
+        }
+    }
+
+    /// This value as a text, if it is one.
+    pub(super) fn as_str(&self) -> Option<&'a str> {
+        self.value.as_str()
+    }
+
+    /// Warns of keys that mean nothing here, with the nearest that does.
+    pub(super) fn warn_of_unknown(&self, known: &[&str], warnings: &mut Vec<String>) {
+        for (node, hint) in self.unknown(known) {
+            warnings.push(format!(
+                "line {}: {} is not known and not used{hint}",
+                node.line(),
+                node.path()
+            ));
+        }
+    }
+
+    /// Refuses keys that mean nothing here.
+    pub(super) fn refuse_unknown(&self, known: &[&str]) -> Result<(), ModelError> {
+        match self.unknown(known).next() {
+            Some((node, hint)) => Err(ModelError {
+                place: Some(place_of(self.text, &node.path)),
+                cause: ModelErrorKind::Unknown {
+                    path: node.path(),
+                    hint,
+                },
+            }),
+            None => Ok(()),
+        }
+    }
+
+    fn unknown<'b>(
+        &self,
+        known: &'b [&str],
+    ) -> impl Iterator<Item = (Node<'a>, String)> + use<'_, 'a, 'b> {
+        let object = self.value.as_object().into_iter().flatten();
+        object
+            .filter(|(key, _)| !known.contains(&key.as_str()))
+            .map(move |(key, value)| {
+                let hint = nearest(key, known.iter().copied())
+                    .map_or_else(String::new, |near| format!("; did you mean {near}?"));
+                (self.child(value, Segment::Key(key.clone())), hint)
+            })
     }
 
     pub(super) fn number(&self, key: &str, allowed: Allowed) -> Result<f64, ModelError> {
@@ -165,14 +241,14 @@ impl<'a> Node<'a> {
             expected: expected.to_string(),
         };
         ModelError {
-            line: Some(self.line()),
+            place: Some(place_of(self.text, &self.path)),
             cause,
         }
     }
 
     /// Line of this value, counted from 1.
     pub(super) fn line(&self) -> usize {
-        line_of(self.text, &self.path)
+        place_of(self.text, &self.path).0
     }
 
     /// Path of this value, as in `links[2].mass`.
@@ -207,7 +283,8 @@ fn display(path: &[Segment]) -> String {
     }
 }
 
-fn line_of(text: &str, path: &[Segment]) -> usize {
+/// Line and column of the value under `path`, counted from 1.
+fn place_of(text: &str, path: &[Segment]) -> (usize, usize) {
     let mut cursor = Cursor {
         bytes: text.as_bytes(),
         at: 0,
@@ -216,10 +293,7 @@ fn line_of(text: &str, path: &[Segment]) -> usize {
     for segment in path {
         cursor.enter(segment);
     }
-    1 + text.as_bytes()[..cursor.at]
-        .iter()
-        .filter(|&&byte| byte == b'\n')
-        .count()
+    crate::text::place(text, cursor.at)
 }
 
 /// Walks text that is known to be valid JSON.

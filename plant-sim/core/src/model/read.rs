@@ -1,0 +1,416 @@
+//! From the text of a model or payload file to checked numbers.
+//!
+//! Every number has a range in which the rest of the program keeps its promises: what travels in a frame fits the frame,
+//! a mass matrix is positive definite, a position fits the 32 bits of an encoder. The ranges are wide; what is outside
+//! them is another unit or a slip of the pen, and the message says which.
+
+use std::f64::consts::{PI, TAU};
+
+use super::json::{self, Node};
+use super::{DriveTrain, Geometry, JointLimits, Link, ModelError, Payload, RobotModel};
+use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
+
+/// Tolerance within which a derived or an implied number repeats another one: model files carry rounded decimals.
+const SAME: f64 = 1e-9;
+
+const LENGTH: Allowed = Allowed::above_zero(10.0, "m");
+const COORDINATE: Allowed = Allowed::within(-10.0, 10.0, "m");
+const LINK_MASS: Allowed = Allowed::above_zero(1000.0, "kg");
+/// Not zero: a shaft without inertia would make the mass matrix singular.
+const LINK_INERTIA: Allowed = Allowed::above_zero(1000.0, "kg m2");
+/// About three turns either way.
+const ANGLE: Allowed = Allowed::within(-20.0, 20.0, "rad");
+const ANGULAR_SPEED: Allowed = Allowed::above_zero(1000.0, "rad/s");
+const SPEED: Allowed = Allowed::above_zero(100.0, "m/s");
+const ANY_POSITIVE: Allowed = Allowed::above_zero(1e9, "");
+const ANY_NOT_NEGATIVE: Allowed = Allowed::within(0.0, 1e9, "");
+/// What a Command can carry.
+const MOTOR_TORQUE: Allowed = Allowed::above_zero(200.0, "N m");
+/// What a Feedback can carry, less a quarter for a motor that is driven faster than it may be.
+const MOTOR_SPEED: Allowed = Allowed::above_zero(1600.0, "rad/s");
+/// One count a sample must not read as full speed.
+const FEWEST_COUNTS: f64 = 256.0;
+
+/// Keys that mean something, and those that other programs put into the same file.
+const ROOT: &[&str] = &[
+    "name",
+    "units",
+    "gravity",
+    "dh",
+    "joint_limits",
+    "links",
+    "payload_rated_max_kg",
+    "drive",
+    "comment",
+    "dh_convention",
+    "base_frame_height_above_mounting",
+    "base",
+    "payload_inertia_izz",
+    "payload_test_10kg",
+    "payload_test_ecc5kg",
+    "spec",
+    "variants",
+];
+const DH: &[&str] = &[
+    "a1",
+    "a2",
+    "alpha",
+    "d1",
+    "d2",
+    "d4",
+    "variables",
+    "comment",
+];
+const LIMITS: &[&str] = &[
+    "lower",
+    "upper",
+    "velocity",
+    "acceleration_cap",
+    "jerk_cap",
+    "effort_peak",
+    "effort_continuous_rms",
+    "comment",
+];
+const LINK: &[&str] = &[
+    "name",
+    "mass",
+    "com_joint_frame",
+    "inertia_com_diag",
+    "com_dh_frame",
+    "lc",
+    "comment",
+];
+const DRIVE: &[&str] = &[
+    "gear_ratio",
+    "ball_screw_lead_m_per_rev",
+    "screw_hand_sign",
+    "rotor_inertia_motor_side",
+    "motor_torque_limit_model",
+    "motor_rated_torque",
+    "motor_max_speed_rad_s",
+    "viscous",
+    "coulomb",
+    "coulomb_tanh_eps",
+    "encoder_counts_per_motor_rev",
+    "comment",
+    "motor_peak_torque",
+    "motor_rated_power_w",
+    "torque_constant_nm_per_arms",
+    "efficiency_info_only",
+    "encoder_multiturn_bits",
+    "gear_stiffness_optional",
+    "gear_damping_ratio_optional",
+];
+const PAYLOAD: &[&str] = &["mass", "com_flange_frame", "inertia_com_diag", "comment"];
+
+pub(super) fn robot(text: &str) -> Result<(RobotModel, Vec<String>), ModelError> {
+    let value = json::parse(text)?;
+    let root = Node::root(text, &value);
+    let mut warnings = Vec::new();
+    let geometry = geometry(
+        &root.get("dh", "the Denavit-Hartenberg table")?,
+        &mut warnings,
+    )?;
+    units(&root)?;
+    let links = links(&root, &geometry, &mut warnings)?;
+    let limits = limits(
+        &root.get("joint_limits", "the limits of the joints")?,
+        &mut warnings,
+    )?;
+    let drive = drive(
+        &root.get("drive", "the data of motors, gears and friction")?,
+        &limits,
+        &mut warnings,
+    )?;
+    let model = RobotModel {
+        name: root.string("name")?.to_owned(),
+        gravity: gravity(&root)?,
+        geometry,
+        limits,
+        links,
+        drive,
+        payload_max: root
+            .get("payload_rated_max_kg", "an object")?
+            .number("max", Allowed::above_zero(100.0, "kg"))?,
+    };
+    root.warn_of_unknown(ROOT, &mut warnings);
+    Ok((model, warnings))
+}
+
+pub(super) fn payload(text: &str) -> Result<Payload, ModelError> {
+    let value = json::parse(text)?;
+    let root = Node::root(text, &value);
+    root.refuse_unknown(PAYLOAD)?;
+    Ok(Payload {
+        mass: root.number("mass", PAYLOAD_MASS)?,
+        com: root.numbers("com_flange_frame", PAYLOAD_COM)?,
+        // A point mass, and a gripper's empty hand, are allowed at the flange.
+        inertia: inertia(&root, PAYLOAD_INERTIA)?,
+    })
+}
+
+fn units(root: &Node<'_>) -> Result<(), ModelError> {
+    match root.optional("units") {
+        Some(units) if !units.as_str().is_some_and(|text| text.starts_with("SI")) => {
+            Err(units.wrong("\"SI: m, kg, s, rad, N, N m\", which is what every number is read in"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn gravity(root: &Node<'_>) -> Result<f64, ModelError> {
+    let [x, y, z] = root.numbers("gravity", Allowed::within(-100.0, 100.0, "m/s2"))?;
+    if x != 0.0 || y != 0.0 {
+        // The lift would no longer be the only axis that carries weight: nothing here is made for that.
+        return Err(root.get("gravity", "")?.wrong("vertical: [0, 0, z]"));
+    }
+    Ok(-z)
+}
+
+fn geometry(dh: &Node<'_>, warnings: &mut Vec<String>) -> Result<Geometry, ModelError> {
+    dh.warn_of_unknown(DH, warnings);
+    let alpha: [f64; 4] = dh.numbers("alpha", ANGLE)?;
+    let scara = [0.0, PI, 0.0, 0.0];
+    if alpha
+        .iter()
+        .zip(scara)
+        .any(|(found, wanted)| (found - wanted).abs() > SAME)
+    {
+        return Err(dh
+            .get("alpha", "")?
+            .wrong("[0, pi, 0, 0], the twists of a SCARA"));
+    }
+    Ok(Geometry {
+        a1: dh.number("a1", LENGTH)?,
+        a2: dh.number("a2", LENGTH)?,
+        d1: dh.number("d1", COORDINATE)?,
+        d2: dh.number("d2", COORDINATE)?,
+        d4: dh.number("d4", COORDINATE)?,
+    })
+}
+
+/// Four numbers of the joints: rotary axes as `turning`, the lift as `lift`.
+fn joints(
+    node: &Node<'_>,
+    key: &str,
+    turning: Allowed,
+    lift: Allowed,
+) -> Result<[f64; 4], ModelError> {
+    let elements = node
+        .get(key, format!("an array of 4: {turning}"))?
+        .elements::<4>(turning)?;
+    let mut numbers = [0.0; 4];
+    for (axis, (number, element)) in numbers.iter_mut().zip(&elements).enumerate() {
+        *number = element.as_number(if axis == 2 { lift } else { turning })?;
+    }
+    Ok(numbers)
+}
+
+fn limits(node: &Node<'_>, warnings: &mut Vec<String>) -> Result<JointLimits, ModelError> {
+    node.warn_of_unknown(LIMITS, warnings);
+    let limits = JointLimits {
+        lower: joints(node, "lower", ANGLE, COORDINATE)?,
+        upper: joints(node, "upper", ANGLE, COORDINATE)?,
+        velocity: joints(node, "velocity", ANGULAR_SPEED, SPEED)?,
+        acceleration: node.numbers("acceleration_cap", ANY_POSITIVE)?,
+        jerk: node.numbers("jerk_cap", ANY_POSITIVE)?,
+        effort: node.numbers("effort_peak", ANY_POSITIVE)?,
+        effort_continuous: node.numbers("effort_continuous_rms", ANY_POSITIVE)?,
+    };
+    each(node, "upper", limits.upper, limits.lower, |upper, lower| {
+        (upper <= lower).then(|| format!("above the lower limit {lower}"))
+    })?;
+    each(
+        node,
+        "effort_continuous_rms",
+        limits.effort_continuous,
+        limits.effort,
+        |continuous, peak| (continuous > peak).then(|| format!("at most the peak, {peak}")),
+    )?;
+    Ok(limits)
+}
+
+/// Compares the elements of the array `key` with others; the first that is `wrong` is named.
+fn each(
+    node: &Node<'_>,
+    key: &str,
+    values: [f64; 4],
+    others: [f64; 4],
+    wrong: impl Fn(f64, f64) -> Option<String>,
+) -> Result<(), ModelError> {
+    let elements = node.get(key, "")?.elements::<4>("")?;
+    for (element, (value, other)) in elements.iter().zip(values.into_iter().zip(others)) {
+        if let Some(expected) = wrong(value, other) {
+            return Err(element.wrong(expected));
+        }
+    }
+    Ok(())
+}
+
+fn links(
+    root: &Node<'_>,
+    geometry: &Geometry,
+    warnings: &mut Vec<String>,
+) -> Result<[Link; 4], ModelError> {
+    let nodes = root
+        .get("links", "an array of 4 links")?
+        .elements::<4>("links")?;
+    let mut links = [Link {
+        mass: 0.0,
+        com: [0.0; 3],
+        inertia: [0.0; 3],
+    }; 4];
+    for (index, (link, node)) in links.iter_mut().zip(&nodes).enumerate() {
+        node.warn_of_unknown(LINK, warnings);
+        check_order(node, index)?;
+        *link = Link {
+            mass: node.number("mass", LINK_MASS)?,
+            com: node.numbers("com_joint_frame", COORDINATE)?,
+            inertia: inertia(node, LINK_INERTIA)?,
+        };
+        check_derived(
+            node,
+            link,
+            com_in_dh_frame(geometry, index, link.com),
+            warnings,
+        )?;
+    }
+    Ok(links)
+}
+
+/// Links have no keys of their own: a name that carries a number says which one the author meant.
+fn check_order(node: &Node<'_>, index: usize) -> Result<(), ModelError> {
+    let Some(name) = node.optional("name") else {
+        return Ok(());
+    };
+    let digits: String = name
+        .as_str()
+        .unwrap_or_default()
+        .chars()
+        .filter(char::is_ascii_digit)
+        .collect();
+    match digits.parse::<usize>() {
+        Ok(number) if (1..=4).contains(&number) && number != index + 1 => Err(name.wrong(format!(
+            "a link {} here: links stand in the order arm 1, arm 2, carriage, shaft",
+            index + 1
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Principal moments of inertia: of a body, none is greater than the sum of the other two.
+fn inertia(node: &Node<'_>, allowed: Allowed) -> Result<[f64; 3], ModelError> {
+    let moments: [f64; 3] = node.numbers("inertia_com_diag", allowed)?;
+    let elements = node.get("inertia_com_diag", "")?.elements::<3>("")?;
+    check_moments(moments).map_err(|(axis, expected)| elements[axis].wrong(expected))?;
+    Ok(moments)
+}
+
+/// The centre of mass of link `index` in the standard DH frame, which stands at the far end of the link.
+fn com_in_dh_frame(geometry: &Geometry, index: usize, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    match index {
+        0 => [x - geometry.a1, y, z - geometry.d1],
+        1 => [x - geometry.a2, -y, geometry.d2 - z],
+        2 => [x, y, z],
+        _ => [x, y, z - geometry.d4],
+    }
+}
+
+fn check_derived(
+    node: &Node<'_>,
+    link: &Link,
+    com_dh: [f64; 3],
+    warnings: &mut Vec<String>,
+) -> Result<(), ModelError> {
+    let mut warn =
+        |derived: &Node<'_>, found: &dyn std::fmt::Debug, follows: &dyn std::fmt::Debug| {
+            warnings.push(format!(
+            "line {}: {} is {found:?}, but {}.com_joint_frame, which is used, gives {follows:?}",
+            derived.line(),
+            derived.path(),
+            node.path()
+        ));
+        };
+    if let Some(derived) = node.optional("com_dh_frame") {
+        let found: [f64; 3] = derived.as_numbers(COORDINATE)?;
+        if found.iter().zip(com_dh).any(|(a, b)| (a - b).abs() > SAME) {
+            warn(&derived, &found, &com_dh);
+        }
+    }
+    if let Some(derived) = node.optional("lc") {
+        let found = derived.as_number(COORDINATE)?;
+        let distance = link.com[0].hypot(link.com[1]);
+        if (found.abs() - distance).abs() > SAME {
+            warn(&derived, &found, &distance);
+        }
+    }
+    Ok(())
+}
+
+fn drive(
+    node: &Node<'_>,
+    limits: &JointLimits,
+    warnings: &mut Vec<String>,
+) -> Result<DriveTrain, ModelError> {
+    node.warn_of_unknown(DRIVE, warnings);
+    let screw_hand = node.number("screw_hand_sign", Allowed::FINITE)?;
+    if screw_hand.abs() != 1.0 {
+        return Err(node.get("screw_hand_sign", "")?.wrong("1 or -1"));
+    }
+    let counts = node.number("encoder_counts_per_motor_rev", ANY_POSITIVE)?;
+    if counts.fract() != 0.0 || !(FEWEST_COUNTS..=f64::from(i32::MAX)).contains(&counts) {
+        return Err(node.get("encoder_counts_per_motor_rev", "")?.wrong(format!(
+            "a whole number from {FEWEST_COUNTS} to {}",
+            i32::MAX
+        )));
+    }
+    let drive = DriveTrain {
+        gear_ratio: node.numbers("gear_ratio", Allowed::above_zero(1e4, ""))?,
+        screw_lead: node.number("ball_screw_lead_m_per_rev", Allowed::above_zero(1.0, "m"))?,
+        screw_hand,
+        rotor_inertia: node.numbers("rotor_inertia_motor_side", ANY_NOT_NEGATIVE)?,
+        motor_torque_limit: node.numbers("motor_torque_limit_model", MOTOR_TORQUE)?,
+        motor_torque_rated: node.numbers("motor_rated_torque", MOTOR_TORQUE)?,
+        motor_speed_limit: node.numbers("motor_max_speed_rad_s", MOTOR_SPEED)?,
+        viscous: node.numbers("viscous", ANY_NOT_NEGATIVE)?,
+        coulomb: node.numbers("coulomb", ANY_NOT_NEGATIVE)?,
+        coulomb_eps: node.numbers("coulomb_tanh_eps", ANY_POSITIVE)?,
+        encoder_counts: counts as u32,
+    };
+    each(
+        node,
+        "motor_rated_torque",
+        drive.motor_torque_rated,
+        drive.motor_torque_limit,
+        |rated, peak| (rated > peak).then(|| format!("at most the motor's limit, {peak} N m")),
+    )?;
+    check_encoder(node, &drive, limits)?;
+    Ok(drive)
+}
+
+/// Motor positions travel as 32-bit counts: they must hold the whole range of every axis, with as much again beyond it.
+fn check_encoder(
+    node: &Node<'_>,
+    drive: &DriveTrain,
+    limits: &JointLimits,
+) -> Result<(), ModelError> {
+    let reach = |axis: usize| limits.lower[axis].abs().max(limits.upper[axis].abs());
+    let turns_of_nut = reach(2) / drive.screw_lead + reach(3) / TAU;
+    let turns = [
+        reach(0) / TAU * drive.gear_ratio[0],
+        reach(1) / TAU * drive.gear_ratio[1],
+        turns_of_nut * drive.gear_ratio[2],
+        reach(3) / TAU * drive.gear_ratio[3],
+    ];
+    for (turns, axis) in turns.iter().zip(["shoulder", "elbow", "lift", "wrist"]) {
+        let most = (f64::from(i32::MAX) / (2.0 * turns)).floor();
+        if f64::from(drive.encoder_counts) > most {
+            return Err(node
+                .get("encoder_counts_per_motor_rev", "")?
+                .wrong(format!(
+                    "at most {most}: the motor of the {axis} makes {turns:.1} turns to its limit, and its position travels as 32 bits"
+                )));
+        }
+    }
+    Ok(())
+}

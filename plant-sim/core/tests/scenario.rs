@@ -1,0 +1,250 @@
+//! Scenario texts: what is refused before anything runs, where, and what is allowed.
+
+use sim::scenario::Scenario;
+use sim::setup::RunConfig;
+
+const BASE: &str = "name = \"t\"
+cycles = 2
+rate_hz = 1000
+law = \"computed-torque:observer\"
+start = [0.5, 0.1, -0.2, 0.0]
+
+[payload]
+mass = 2.0
+com_flange_frame = [0.0, 0.0, 0.05]
+inertia_com_diag = [0.008, 0.008, 0.01]
+
+[[cycle]]
+jump = { to = [0.6, 0.1, -0.2, 0.0], top = -0.15, clearance = 0.005 }
+[[cycle]]
+dwell = 0.1
+";
+
+/// What is said of the text with one passage replaced, before a run.
+fn refusal(from: &str, to: &str) -> String {
+    assert_eq!(BASE.matches(from).count(), 1, "{from}");
+    said_of(&BASE.replace(from, to))
+}
+
+fn said_of(text: &str) -> String {
+    match Scenario::parse(text, "x.toml") {
+        Err(error) => error.to_string(),
+        Ok(scenario) => RunConfig::new(scenario).rig().expect_err(text).to_string(),
+    }
+}
+
+#[test]
+fn the_base_is_accepted() {
+    let scenario = Scenario::parse(BASE, "x.toml").unwrap();
+    RunConfig::new(scenario).rig().unwrap();
+}
+
+#[test]
+fn what_does_not_fit_the_text_is_refused() {
+    for (from, to, expected) in [
+        (
+            "cycles = 2",
+            "cycles = 2\nspeeed = 1",
+            "unknown field `speeed`",
+        ),
+        ("cycles = 2", "cycels = 2", "did you mean cycles?"),
+        ("clearance", "clearence", "did you mean clearance?"),
+        ("cycles = 2", "cycles = 2\ncycles = 3", "duplicate key"),
+        (
+            "computed-torque:observer",
+            "magic",
+            "no control law 'magic'",
+        ),
+        ("dwell = 0.1", "wait = 0.1", "unknown variant `wait`"),
+        ("dwell = 0.1", "place = { now = 1 }", "unexpected keys in table: now"),
+        (
+            "[0.5, 0.1, -0.2, 0.0]",
+            "[0.5, 0.1, -0.2, 0.0, 9]",
+            "an array of 5; it must be an array of 4 numbers",
+        ),
+        (
+            "[0.0, 0.0, 0.05]",
+            "[0.0, 0.05]",
+            "an array of 2; it must be an array of 3 numbers",
+        ),
+        (
+            "to = [0.6, 0.1, -0.2, 0.0]",
+            "to = [0.6, 0.1, -0.2, 0.0, 1.57]",
+            "an array of 5; it must be an array of 4 numbers",
+        ),
+    ] {
+        let message = refusal(from, to);
+        assert!(message.starts_with("scenario x.toml: "), "{message}");
+        assert!(
+            message.contains("line ") && message.contains(expected),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn values_out_of_range_are_named_with_place_value_and_range() {
+    for (from, to, expected) in [
+        (
+            "cycles = 2",
+            "cycles = 0",
+            "line 2, column 10: cycles is 0; allowed: 1 to 1000000",
+        ),
+        ("cycles = 2", "cycles = 1000000000", "allowed: 1 to 1000000"),
+        (
+            "= 1000",
+            "= 1",
+            "line 3, column 11: rate_hz is 1; allowed: 100 to 10000 Hz",
+        ),
+        (
+            "= 1000",
+            "= nan",
+            "rate_hz is NaN; allowed: 100 to 10000 Hz",
+        ),
+        (
+            "dwell = 0.1",
+            "dwell = nan",
+            "line 15, column 9: cycle[1].dwell is NaN; allowed: a number >= 0, at most 3600 s",
+        ),
+        ("dwell = 0.1", "stop = -1", "cycle[1].stop is -1; allowed"),
+        (
+            "clearance = 0.005 }",
+            "clearance = 0.005, speed = 2.0 }",
+            "cycle[0].jump.speed is 2; allowed: a number > 0, at most 1 of full speed",
+        ),
+        (
+            "clearance = 0.005",
+            "clearance = -0.05",
+            "line 13, column 63: cycle[0].jump.clearance is -0.05; allowed: a number >= 0, at most 1 m",
+        ),
+        // Millimetres and degrees.
+        (
+            "to = [0.6, 0.1, -0.2, 0.0]",
+            "to = [600, 100, -200, 0.0]",
+            "line 13, column 16: cycle[0].jump.to[0] is 600; allowed: a number from -10 to 10 m; lengths are in m: 600 mm are 0.6",
+        ),
+        (
+            "to = [0.6, 0.1, -0.2, 0.0]",
+            "to = [0.6, 0.1, -0.2, 90.0]",
+            "cycle[0].jump.to[3] is 90; allowed: a number from -12.566370614359172 to 12.566370614359172 rad; angles are in rad: 90 degrees are 1.570796",
+        ),
+        (
+            "top = -0.15",
+            "top = -150",
+            "lengths are in m: -150 mm are -0.15",
+        ),
+        (
+            "[0.5, 0.1, -0.2, 0.0]",
+            "[500, 0.1, -0.2, 0.0]",
+            "start[0] is 500",
+        ),
+        // Bodies that there are not, or that no request can carry.
+        (
+            "mass = 2.0",
+            "mass = nan",
+            "line 8, column 8: payload.mass is NaN; allowed: a number >= 0, at most 100 kg",
+        ),
+        (
+            "mass = 2.0",
+            "mass = -2.0",
+            "payload.mass is -2; allowed: a number >= 0, at most 100 kg",
+        ),
+        (
+            "mass = 2.0",
+            "mass = 1000.0",
+            "payload.mass is 1000; allowed: a number >= 0, at most 100 kg",
+        ),
+        (
+            "[0.0, 0.0, 0.05]",
+            "[0.0, inf, 0.05]",
+            "payload.com_flange_frame[1] is inf; allowed: a number from -1 to 1 m",
+        ),
+        (
+            "[0.0, 0.0, 0.05]",
+            "[0.0, 0.0, 50.0]",
+            "lengths are in m: 50 mm are 0.05",
+        ),
+        (
+            "[0.008, 0.008, 0.01]",
+            "[0.0, 0.0, 1.0]",
+            "line 10, column 31: payload.inertia_com_diag[2] is 1; allowed: at most the sum of the other two moments, 0",
+        ),
+        (
+            "[0.008, 0.008, 0.01]",
+            "[0.008, 0.008, 1e300]",
+            "payload.inertia_com_diag[2] is 1000",
+        ),
+        (
+            "[[cycle]]\ndwell",
+            "[mismatch]\nfriction = -1\n[[cycle]]\ndwell",
+            "mismatch.friction is -1; allowed: a number >= 0, at most 10",
+        ),
+    ] {
+        let message = refusal(from, to);
+        assert!(message.starts_with("scenario x.toml: "), "{message}");
+        assert!(
+            message.contains(expected),
+            "{message}\nshould say {expected}"
+        );
+    }
+}
+
+#[test]
+fn what_this_robot_cannot_do_is_refused_before_the_run() {
+    for (from, to, expected) in [
+        (
+            "mass = 2.0",
+            "mass = 23.0",
+            "payload.mass is 23; allowed: a number >= 0, at most 22 kg",
+        ),
+        (
+            "[payload]",
+            "[gains]\nbandwidth = 2000\ndamping = 1\nobserver = 100\n[payload]",
+            "line 8, column 13: gains.bandwidth is 2000; allowed: more than 0, at most",
+        ),
+        (
+            "[payload]",
+            "[gains]\nbandwidth = 100\ndamping = nan\nobserver = 100\n[payload]",
+            "gains.damping is NaN; allowed: more than 0, at most 5 at 1000 Hz",
+        ),
+        // The hand already holds the payload of the start.
+        (
+            "dwell = 0.1",
+            "pick = { mass = 5, com_flange_frame = [0, 0, 0], inertia_com_diag = [0, 0, 0] }",
+            "cycle[1].pick is a payload of 5 kg; allowed: a hand that is empty; it holds 2 kg",
+        ),
+        // The second cycle begins with an empty hand.
+        (
+            "dwell = 0.1",
+            "place = {}",
+            "cycle[1].place is nothing; allowed: a hand that holds something",
+        ),
+    ] {
+        let message = refusal(from, to);
+        assert!(
+            message.contains(expected),
+            "{message}\nshould say {expected}"
+        );
+    }
+}
+
+/// What one cycle leaves in the hand, the next one finds there.
+#[test]
+fn a_hand_is_followed_from_cycle_to_cycle() {
+    let empty = BASE.replace("mass = 2.0", "mass = 0.0");
+    let pick = "pick = { mass = 5, com_flange_frame = [0, 0, 0], inertia_com_diag = [0, 0, 0] }";
+    let never_placed = empty.replace("dwell = 0.1", pick);
+    assert!(said_of(&never_placed).contains("it holds 5 kg"));
+    let once = never_placed.replace("cycles = 2", "cycles = 1");
+    assert!(
+        RunConfig::new(Scenario::parse(&once, "x").unwrap())
+            .rig()
+            .is_ok()
+    );
+    let placed = empty.replace("dwell = 0.1", &format!("{pick}\n[[cycle]]\nplace = {{}}"));
+    assert!(
+        RunConfig::new(Scenario::parse(&placed, "x").unwrap())
+            .rig()
+            .is_ok()
+    );
+}
