@@ -179,7 +179,7 @@ fn physics_that_no_robot_has_is_refused() {
         (
             r#""inertia_com_diag": [0.053, 0.53, 0.55]"#,
             r#""inertia_com_diag": [0.053, 0.53, 5.0]"#,
-            "links[0].inertia_com_diag[2] is 5.0; it must be at most the sum of the other two moments",
+            "links[0].inertia_com_diag[2] is 5; it must be at most the sum of the other two moments",
         ),
         // Other units, one by one and all at once.
         (
@@ -201,7 +201,7 @@ fn physics_that_no_robot_has_is_refused() {
         (
             r#"[0.2, 0.0, 0.0902]"#,
             r#"[1e9, 0.0, 0.0902]"#,
-            "links[1].com_joint_frame[0] is 1000000000.0; it must be a number from -10 to 10 m",
+            "links[1].com_joint_frame[0] is 1000000000; it must be a number from -10 to 10 m",
         ),
         // Links in another order than the frames.
         (
@@ -213,12 +213,12 @@ fn physics_that_no_robot_has_is_refused() {
         (
             r#""effort_peak": [640.0"#,
             r#""effort_peak": [200.0"#,
-            "joint_limits.effort_continuous_rms[0] is 216.0; it must be at most the peak, 200",
+            "joint_limits.effort_continuous_rms[0] is 216; it must be at most the peak, 200",
         ),
         (
             r#""motor_rated_torque": [3.18"#,
             r#""motor_rated_torque": [9.0"#,
-            "drive.motor_rated_torque[0] is 9.0; it must be at most the motor's limit, 8 N m",
+            "drive.motor_rated_torque[0] is 9; it must be at most the motor's limit, 8 N m",
         ),
         // What frames carry.
         (

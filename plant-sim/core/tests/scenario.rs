@@ -56,7 +56,11 @@ fn what_does_not_fit_the_text_is_refused() {
             "no control law 'magic'",
         ),
         ("dwell = 0.1", "wait = 0.1", "unknown variant `wait`"),
-        ("dwell = 0.1", "place = { now = 1 }", "unexpected keys in table: now"),
+        (
+            "dwell = 0.1",
+            "place = { now = 1 }",
+            "unexpected keys in table: now",
+        ),
         (
             "[0.5, 0.1, -0.2, 0.0]",
             "[0.5, 0.1, -0.2, 0.0, 9]",

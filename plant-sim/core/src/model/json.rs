@@ -233,6 +233,9 @@ impl<'a> Node<'a> {
         let found = match self.value {
             Value::Array(values) => format!("an array of {}", values.len()),
             Value::Object(_) => "an object".to_owned(),
+            Value::Number(number) => number
+                .as_f64()
+                .map_or_else(|| number.to_string(), |number| number.to_string()),
             scalar => scalar.to_string(),
         };
         let cause = ModelErrorKind::Wrong {
