@@ -112,14 +112,12 @@ impl Scenario {
                         }
                         self.number(&format!("{key}.mass"), payload.mass, carry)?;
                     }
-                    Step::Place {} => {
-                        if held.take().is_none() {
-                            return Err(self.wrong(
-                                &format!("cycle[{index}].place"),
-                                "nothing",
-                                "a hand that holds something: pick it first",
-                            ));
-                        }
+                    Step::Place {} if held.take().is_none() => {
+                        return Err(self.wrong(
+                            &format!("cycle[{index}].place"),
+                            "nothing",
+                            "a hand that holds something: pick it first",
+                        ));
                     }
                     _ => {}
                 }
