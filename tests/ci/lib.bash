@@ -80,10 +80,10 @@ debian() { # debian PACKAGE...: installs them
         fail "missing here. Debian: apt-get install $*"
     fi
     echo "installing $*"
-    # The lists may be missing or of last year.
-    apt_get install --no-install-recommends "$@" ||
-        { apt_get update && apt_get install --no-install-recommends "$@"; } ||
-        fail "cannot install $*"
+    # Old lists lead to old versions. Once in a check is enough.
+    [ -n "${lists_are_new:-}" ] || apt_get update || fail "cannot update the lists of packages"
+    lists_are_new=yes
+    apt_get install --no-install-recommends "$@" || fail "cannot install $*"
 }
 
 need() { # need COMMAND PACKAGE
