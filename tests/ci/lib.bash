@@ -2,14 +2,14 @@
 #
 #     source "$(dirname "$0")/lib.bash"
 #
-# and from there on
-#   - runs in the project's root, has a temporary directory $work, and $target, where cargo builds;
-#   - ends at the first command that fails, and says which one that was, where, and what it wrote last: to standard error, or
-#     into $work/NAME.err, where a check lets a command write that it keeps quiet;
-#   - takes the jobs it has started with it.
+# and from there on it
+#   - runs in the project's root, with a temporary directory $work, and $target where cargo builds;
+#   - ends at the first command that fails, and reports which command, where, and the last lines of standard error. Where a
+#     check keeps a command quiet, it sends its standard error to $work/NAME.err, so that the report finds it;
+#   - ends the jobs it has started when it ends.
 #
-# What it needs, it asks for: need, need_python, need_vcan, need_cross install it as root on Debian and say what is missing
-# elsewhere. build_host builds our own programs.
+# need, need_python, need_vcan and need_cross install what a check depends on (root on Debian) or say what is missing.
+# build_host builds our own programs.
 
 set -Eeuo pipefail
 shopt -s inherit_errexit
@@ -19,8 +19,8 @@ export CARGO_TERM_COLOR=never PATH=$PATH:/usr/sbin:/sbin
 work=$(mktemp -d)
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 
-# explain WHAT: the place in the caller's caller and below it, and the last lines of what was written into $work/*.err. Once: a
-# subshell that fails takes its parents with it.
+# explain WHAT: prints it with the chain of callers and the end of the newest $work/*.err. Once: a subshell that fails makes
+# its parents fail too.
 explain() {
     [ ! -e "$work/explained" ] || return 0
     touch "$work/explained"
@@ -103,7 +103,7 @@ need_python() { # need_python MODULE==VERSION...: sets $python; versions are fix
     "$python" -m pip install --quiet --disable-pip-version-check "$@"
 }
 
-need_vcan() { # what tests/with-vcan takes, and candump
+need_vcan() { # what tests/with-vcan needs, and candump
     need ip iproute2
     need candump can-utils
     need insmod kmod
@@ -111,7 +111,7 @@ need_vcan() { # what tests/with-vcan takes, and candump
         need linux.uml user-mode-linux
 }
 
-need_cross() { # need_cross TARGET: what tests/cross takes, clippy included
+need_cross() { # need_cross TARGET: what tests/cross needs for it, clippy included
     tests/cross "$1" clippy --version >/dev/null 2>&1 || debian rustc-web cargo-web rust-web-src rust-web-clippy lld
     tests/cross "$1" clippy --version >/dev/null 2>"$work/cross.err"
 }
