@@ -1,10 +1,10 @@
-#!/bin/bash
+#!/usr/bin/env bash
 # Our traces in the hands of others, and theirs in ours: can-utils, python-can, tshark.
-source "$(dirname "$0")/20-peers.bash"
-export DEBIAN_FRONTEND=noninteractive
-apt_peer log2asc can-utils
-apt_peer tshark tshark
-python_peers python-can==4.6.1
+source "$(dirname "$0")/lib.bash"
+need log2asc can-utils
+need tshark tshark
+need_python python-can==4.6.1
+build_host
 
 trace=$work/run/trace.log
 "$plant_sim" run --scenario gate --cycles 1 --out "$work/run" >/dev/null

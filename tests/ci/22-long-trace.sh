@@ -1,9 +1,9 @@
-#!/bin/bash
+#!/usr/bin/env bash
 # Traces of hours stream: what their readers remember does not grow with them. LONG=7000000 tries an hour and a half.
-source "$(dirname "$0")/20-peers.bash"
-apt_peer time time
-cargo build --release --locked --quiet --package plant-sim
-plant_sim=$target/release/plant-sim
+source "$(dirname "$0")/lib.bash"
+need time time
+need python3 python3
+build_host
 long=${LONG:-700000}
 
 "$plant_sim" run --scenario gate --out "$work/run" >/dev/null
@@ -12,15 +12,15 @@ kib() { # kib FRAMES COMMAND...: peak resident memory of the command that reads 
     shift
     [ "$1" = stats ] && out=$work/out
     python3 tests/ci/22-repeat.py "$work/run/trace.log" "$frames" |
-        env time --format %M --output "$work/kib" "$plant_sim" trace "$@" - 2>"$work/err" >"$out" ||
-        { cat "$work/err"; echo "FAIL: trace $*"; exit 1; }
-    [ "$1" != stats ] || grep -q "^$frames frames" "$out" || { echo "FAIL: not $frames frames"; exit 1; }
+        env time --format %M --output "$work/kib" "$plant_sim" trace "$@" - 2>"$work/trace.err" >"$out" ||
+        fail "trace $*"
+    [ "$1" != stats ] || grep -q "^$frames frames" "$out" || fail "not $frames frames"
     cat "$work/kib"
 }
 for command in stats decode "decode --format csv" "decode --format jsonl" "convert --to pcapng" "convert --to asc" plot; do
     short=$(kib $((long / 10)) $command)
     full=$(kib "$long" $command)
     # Four bytes kept of each frame would be 2.4 MiB more.
-    [ $((full - short)) -lt 2048 ] || { echo "FAIL: trace $command grows from $short to $full KiB"; exit 1; }
+    [ $((full - short)) -lt 2048 ] || fail "trace $command grows from $short to $full KiB"
     echo "ok: trace $command of $long frames in $full KiB, of a tenth in $short KiB"
 done

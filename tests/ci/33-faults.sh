@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Hard fault, stack overflow, panic and reset of the controller on the Cortex-M4F end with torque off, and their reason is
 # reported after the restart.
-. "$(dirname "$0")/30-board.bash"
+source "$(dirname "$0")/lib.bash"
+source tests/ci/board.bash
 
 echo "- every fault, planted into a moving arm"
 faults=$(built mps2-an386 --bin mps2-an386-faults)
@@ -9,9 +10,8 @@ timeout 120 "$plant_sim" crash --image "$faults"
 
 echo "- the image that goes into runs obeys no request to fail, only network management's reset; that is seen"
 image=$(built mps2-an386 --bin mps2-an386)
-if timeout 120 "$plant_sim" crash --image "$image" >"$scratch/production" 2>&1; then
-    echo "33-faults: the production image has planted faults" >&2
-    exit 1
+if timeout 120 "$plant_sim" crash --image "$image" >"$work/production.err" 2>&1; then
+    fail "the production image has planted faults"
 fi
-[ "$(grep -c 'FAILED: the controller in QEMU ended' "$scratch/production")" = 4 ]
-grep -q '^software-reset  *0111 > 1000  *software ' "$scratch/production"
+[ "$(grep -c 'FAILED: the controller in QEMU ended' "$work/production.err")" = 4 ]
+grep -q '^software-reset  *0111 > 1000  *software ' "$work/production.err"

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Memory of both images, and instructions of the controller on the emulated Cortex-M4F: within their goals, near the kept
 # figures, and the same to the instruction in every run.
-. "$(dirname "$0")/30-board.bash"
+source "$(dirname "$0")/lib.bash"
+source tests/ci/board.bash
 
 image=$(built mps2-an386 --bin mps2-an386)
 cost_image=$(built mps2-an386 --bin mps2-an386-cost)
@@ -9,9 +10,9 @@ board stm32g474
 
 echo "- two counts are the same"
 for count in first second; do
-    timeout 100 "$plant_sim" cost --json --image "$image" --cost-image "$cost_image" >"$scratch/$count"
+    timeout 100 "$plant_sim" cost --json --image "$image" --cost-image "$cost_image" >"$work/$count"
 done
-cmp "$scratch/first" "$scratch/second"
+cmp "$work/first" "$work/second"
 
 echo "- memory and instructions"
 timeout 100 python3 tests/board/budget.py "${image%/*}" "$plant_sim"

@@ -1,0 +1,150 @@
+# What every check shares. A check begins with
+#
+#     source "$(dirname "$0")/lib.bash"
+#
+# and from there on it
+#   - runs in the project's root, with a temporary directory $work, and $target where cargo builds;
+#   - ends at the first command that fails, and reports which command, where, and the last lines of standard error. Where a
+#     check keeps a command quiet, it sends its standard error to $work/NAME.err, so that the report finds it;
+#   - ends the jobs it has started when it ends.
+#
+# need, need_python, need_vcan and need_cross install what a check depends on (root on Debian) or say what is missing.
+# build_host builds our own programs.
+
+set -Eeuo pipefail
+shopt -s inherit_errexit
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+export CARGO_TERM_COLOR=never PATH=$PATH:/usr/sbin:/sbin
+
+work=$(mktemp -d)
+target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+
+# explain WHAT: prints it with the chain of callers and the end of the newest $work/*.err. Once: a subshell that fails makes
+# its parents fail too.
+explain() {
+    [ ! -e "$work/explained" ] || return 0
+    touch "$work/explained"
+    local depth file
+    {
+        echo "FAIL: $1"
+        for ((depth = 1; depth < ${#FUNCNAME[@]} - 1; depth++)); do
+            echo "    at ${BASH_SOURCE[depth + 1]}:${BASH_LINENO[depth]}"
+        done
+        for file in $(find "$work" -maxdepth 1 -name '*.err' -size +0 -printf '%T@ %p\n' | sort -r | head -n 3 | cut -d' ' -f2-); do
+            echo "--- the end of ${file##*/}"
+            tail -n 20 "$file"
+        done
+    } >&2
+}
+
+failed() { # failed STATUS COMMAND, by the trap
+    local why
+    case $1 in
+        124) why="status 124, out of time" ;;
+        127) why="status 127, no such command" ;;
+        137) why="status 137, killed" ;;
+        141) why="status 141, a pipe whose reader has ended" ;;
+        *) why="status $1" ;;
+    esac
+    explain "$2 ($why)"
+}
+trap 'failed $? "$BASH_COMMAND"' ERR
+
+fail() { # fail MESSAGE
+    explain "$1"
+    exit 1
+}
+
+finish() {
+    local jobs
+    jobs=$(jobs -p)
+    [ -z "$jobs" ] || kill $jobs 2>/dev/null || true
+    rm -rf "$work"
+}
+trap finish EXIT
+
+apt_get() { # apt_get ARGUMENT...: waits while another apt is at work, for ten minutes at most
+    local waited=0
+    # apt's own DPkg::Lock::Timeout waits for the lock of dpkg, and not for those of the lists and the downloads.
+    until LC_ALL=C DEBIAN_FRONTEND=noninteractive apt-get -q -y -o Acquire::Retries=3 "$@" >"$work/apt.err" 2>&1 </dev/null; do
+        grep -q 'Could not get lock' "$work/apt.err" && [ "$waited" -lt 600 ] || return 1
+        [ "$waited" -gt 0 ] || echo "waiting for another apt: $(grep -m 1 -o 'Could not get lock.*' "$work/apt.err")"
+        sleep 2
+        waited=$((waited + 2))
+    done
+    rm "$work/apt.err"
+}
+
+debian() { # debian PACKAGE...: installs them
+    if [ "$(id -u)" != 0 ] || ! type -P apt-get >/dev/null; then
+        fail "missing here. Debian: apt-get install $*"
+    fi
+    echo "installing $*"
+    # Old lists lead to old versions. Once in a check is enough.
+    [ -n "${lists_are_new:-}" ] || apt_get update || fail "cannot update the lists of packages"
+    lists_are_new=yes
+    apt_get install --no-install-recommends "$@" || fail "cannot install $*"
+}
+
+need() { # need COMMAND PACKAGE
+    # -P: a program, not the shell's word of the same name.
+    type -P "$1" >/dev/null || debian "$2"
+    type -P "$1" >/dev/null || fail "$2 is installed and holds no $1"
+}
+
+need_python() { # need_python MODULE==VERSION...: sets $python; versions are fixed, so that a check fails because of us alone
+    need python3 python3
+    python=$target/peers/bin/python
+    if ! "$python" -m pip --version >/dev/null 2>&1; then
+        # A package of its own in Debian.
+        python3 -c 'import ensurepip' 2>/dev/null || debian python3-venv
+        python3 -m venv --clear "$target/peers"
+    fi
+    "$python" -m pip install --quiet --disable-pip-version-check "$@"
+}
+
+need_vcan() { # what tests/with-vcan needs, and candump
+    need ip iproute2
+    need candump can-utils
+    need insmod kmod
+    ip link show vcan0 up 2>/dev/null | grep -q 'mtu 72' || ip link add dev vcan0 type vcan 2>/dev/null ||
+        need linux.uml user-mode-linux
+}
+
+need_cross() { # need_cross TARGET: what tests/cross needs for it, clippy included
+    tests/cross "$1" clippy --version >/dev/null 2>&1 || debian rustc-web cargo-web rust-web-src rust-web-clippy lld
+    tests/cross "$1" clippy --version >/dev/null 2>"$work/cross.err"
+}
+
+build_host() { # sets $bin, $plant_sim and $controller
+    bin=$target/release
+    plant_sim=$bin/plant-sim controller=$bin/controller
+    cargo build --release --locked --quiet --package plant-sim --package controller-host
+}
+
+eventually() { # eventually WHAT COMMAND...: waits until the command succeeds; a minute is long enough for any machine
+    local what=$1
+    shift
+    for _ in $(seq 600); do
+        "$@" && return
+        sleep 0.1
+    done
+    fail "$what did not happen within a minute"
+}
+
+await() { # await FILE TEXT
+    eventually "\"$2\" in $1" grep -qs "$2" "$1"
+}
+
+refused() { # refused TEXT COMMAND...: the command fails, and says so
+    local text=$1
+    shift
+    if "$@" >"$work/refused.out" 2>"$work/refused.err"; then
+        fail "succeeded, and was to be refused: $*"
+    fi
+    grep -q "$text" "$work/refused.err" || fail "no \"$text\" in what was said by: $*"
+    rm "$work/refused.err"
+}
+
+type -P cargo >/dev/null || fail "cargo is missing; install Rust 1.89 or newer from https://rustup.rs"
+need cc gcc
