@@ -15,6 +15,7 @@
 //!   right.
 #![no_std]
 #![forbid(unsafe_code)]
+#![deny(clippy::disallowed_methods)]
 #![cfg_attr(
     not(test),
     deny(

@@ -1,12 +1,14 @@
 //! Simulated robot cell: plant, drives, bit-timed CAN bus, operator and controller in lock-step.
 
 #![forbid(unsafe_code)]
+#![deny(clippy::disallowed_methods)]
 
 mod allowed;
 pub mod bus;
 mod convert;
 pub mod drives;
 pub mod endpoint;
+mod maths;
 pub mod metrics;
 pub mod model;
 pub mod operator;

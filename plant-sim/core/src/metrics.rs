@@ -10,6 +10,7 @@
 
 use serde::Serialize;
 
+use crate::maths::square;
 use crate::model::RobotModel;
 use crate::plant::arm::Arm;
 use crate::rig::Truth;
@@ -260,7 +261,7 @@ impl Cycle {
 
 fn distance(tool: &[f64; 4], to: &[f64; 3]) -> f64 {
     let [x, y, z, _] = tool;
-    ((x - to[0]).powi(2) + (y - to[1]).powi(2) + (z - to[2]).powi(2)).sqrt()
+    (square(x - to[0]) + square(y - to[1]) + square(z - to[2])).sqrt()
 }
 
 fn spread(values: &[f64]) -> Option<Spread> {

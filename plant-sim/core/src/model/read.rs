@@ -9,6 +9,7 @@ use std::f64::consts::{PI, TAU};
 use super::json::{self, Node};
 use super::{DriveTrain, Geometry, JointLimits, Link, ModelError, Payload, RobotModel};
 use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
+use crate::maths::hypot;
 
 /// Tolerance within which a derived or an implied number repeats another one: model files carry rounded decimals.
 const SAME: f64 = 1e-9;
@@ -339,7 +340,7 @@ fn check_derived(
     }
     if let Some(derived) = node.optional("lc") {
         let found = derived.as_number(COORDINATE)?;
-        let distance = link.com[0].hypot(link.com[1]);
+        let distance = hypot(link.com[0], link.com[1]);
         if (found.abs() - distance).abs() > SAME {
             warn(&derived, &found, &distance);
         }

@@ -5,6 +5,7 @@
 //! shares no formula with them, so that the plant can contradict the controller.
 
 use super::spatial::{Force, Inertia, Motion, Transform};
+use crate::maths::sin_cos;
 use crate::model::{Payload, RobotModel};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
@@ -60,7 +61,7 @@ impl Joint {
 
     fn transform(self, position: f64) -> Transform {
         match self {
-            Self::Revolute => Transform::rotation_z(position.sin_cos()),
+            Self::Revolute => Transform::rotation_z(sin_cos(position)),
             Self::Prismatic => Transform::translation(Vector3::new(0.0, 0.0, position)),
         }
     }

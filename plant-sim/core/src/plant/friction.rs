@@ -1,8 +1,10 @@
 //! Coulomb friction that builds up smoothly: `level tanh(speed / eps)`.
 
+use crate::maths::tanh;
+
 /// Friction against a motion at `speed`.
 pub(super) fn coulomb(level: f64, eps: f64, speed: f64) -> f64 {
-    level * (speed / eps).tanh()
+    level * tanh(speed / eps)
 }
 
 /// Friction over speed: the damper that brakes as hard at this speed.

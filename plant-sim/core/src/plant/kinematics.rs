@@ -2,6 +2,7 @@
 
 use super::arm::{Arm, Configuration};
 use super::spatial::{Motion, Transform};
+use crate::maths::{atan2, hypot, sin_cos};
 use crate::model::{Geometry, JointLimits};
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector4, Vector6};
 use std::f64::consts::{PI, TAU};
@@ -69,7 +70,7 @@ impl Arm {
             x: origin.x,
             y: origin.y,
             z: origin.z,
-            yaw: wrap(rotation[(1, 0)].atan2(rotation[(0, 0)])),
+            yaw: wrap(atan2(rotation[(1, 0)], rotation[(0, 0)])),
         }
     }
 
@@ -117,7 +118,7 @@ pub fn inverse(
     pose: &Pose,
 ) -> Result<[Solution; 2], Unreachable> {
     let Geometry { a1, a2, d1, d2, d4 } = *geometry;
-    let radius = pose.x.hypot(pose.y);
+    let radius = hypot(pose.x, pose.y);
     let (outer, inner) = (a1 + a2, (a1 - a2).abs());
     if radius > outer + TOLERANCE {
         return Err(Unreachable::TooFar);
@@ -128,8 +129,9 @@ pub fn inverse(
     let to_outer = ((outer - radius) * (outer + radius)).max(0.0).sqrt();
     let to_inner = ((radius - inner) * (radius + inner)).max(0.0).sqrt();
     Ok([1.0, -1.0].map(|side| {
-        let theta2 = side * 2.0 * to_outer.atan2(to_inner);
-        let theta1 = wrap(pose.y.atan2(pose.x) - (a2 * theta2.sin()).atan2(a1 + a2 * theta2.cos()));
+        let theta2 = side * 2.0 * atan2(to_outer, to_inner);
+        let (sin, cos) = sin_cos(theta2);
+        let theta1 = wrap(atan2(pose.y, pose.x) - atan2(a2 * sin, a1 + a2 * cos));
         let q = Vector4::new(
             theta1,
             theta2,

@@ -1,5 +1,6 @@
 //! End stops: a one-sided spring with a damper at each joint limit.
 
+use crate::maths::square;
 use crate::model::JointLimits;
 use nalgebra::Vector4;
 
@@ -49,7 +50,7 @@ impl EndStops {
     /// Energy stored in the springs, J.
     pub fn energy(&self, q: &Vector4<f64>) -> f64 {
         (0..4)
-            .map(|i| 0.5 * self.stiffness[i] * self.depth(q, i).powi(2))
+            .map(|i| 0.5 * self.stiffness[i] * square(self.depth(q, i)))
             .sum()
     }
 
