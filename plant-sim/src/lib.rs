@@ -12,7 +12,7 @@ pub mod monitor;
 pub mod output;
 pub mod play;
 pub mod plot;
+pub mod progress;
 pub mod qemu;
-pub mod record;
 pub mod replay;
 pub mod run;

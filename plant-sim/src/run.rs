@@ -6,12 +6,13 @@ use std::time::Instant;
 use firmware::control::controller::Config;
 use serde::Serialize;
 use sim::endpoint::{Endpoint, EndpointError, InProcess};
+use sim::record::{TraceLog, TruthLog};
 use sim::run::{Failure, with_controller};
 use sim::setup::{RunConfig, SetupError};
 use sim::summary::Summary;
 
 use crate::output::{Folder, OutputError};
-use crate::record::{Progress, TraceLog, TruthLog};
+use crate::progress::Progress;
 
 /// Why there are no results.
 #[derive(Debug, thiserror::Error)]

@@ -1,8 +1,8 @@
 //! The whole loop in lock-step: controller, CAN frames, drives and plant, judged by the truth.
 
-use plant_sim::record::TraceLog;
 use sim::metrics::RmsMax;
 use sim::model::RobotModel;
+use sim::record::TraceLog;
 use sim::run::{Failure, in_process};
 use sim::scenario::{Mismatch, PayloadSpec, Scenario, Step};
 use sim::setup::{RunConfig, SetupError};

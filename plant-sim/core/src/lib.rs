@@ -13,6 +13,7 @@ pub mod metrics;
 pub mod model;
 pub mod operator;
 pub mod plant;
+pub mod record;
 pub mod rig;
 pub mod run;
 pub mod scenario;

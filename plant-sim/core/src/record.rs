@@ -1,12 +1,11 @@
-//! Observers that keep a run: its trace, its truth, and how far it is.
+//! Observers that keep a run: its trace and its truth, as text into any sink.
 
 use std::io::{self, Write};
-use std::time::Instant;
 
 use protocol::frame::CanFrame;
-use sim::operator::Hand;
-use sim::rig::{Observer, Truth};
 use trace::{Interface, LogHash, Writer};
+
+use crate::rig::{Observer, Truth};
 
 /// Every frame, as `candump -L` writes it.
 pub struct TraceLog<W: Write>(Writer<W>);
@@ -77,35 +76,5 @@ impl<W: Write> Observer for TruthLog<W> {
             }
         }
         self.0.write_all(b"\n")
-    }
-}
-
-/// Says on standard error how far a long run is.
-pub struct Progress {
-    total: u32,
-    done: u32,
-    shown: Instant,
-}
-
-impl Progress {
-    /// At the start of so many cycles.
-    pub fn new(total: u32) -> Self {
-        Self {
-            total,
-            done: 0,
-            shown: Instant::now(),
-        }
-    }
-}
-
-impl Observer for Progress {
-    fn hand(&mut self, hand: &Hand) {
-        if matches!(hand, Hand::EndCycle) {
-            self.done += 1;
-            if self.shown.elapsed().as_secs() >= 2 {
-                self.shown = Instant::now();
-                eprintln!("cycle {} of {}", self.done, self.total);
-            }
-        }
     }
 }

@@ -1,0 +1,36 @@
+//! The observer that says how far a run is.
+
+use std::time::Instant;
+
+use sim::operator::Hand;
+use sim::rig::Observer;
+
+/// Says on standard error how far a long run is.
+pub struct Progress {
+    total: u32,
+    done: u32,
+    shown: Instant,
+}
+
+impl Progress {
+    /// At the start of so many cycles.
+    pub fn new(total: u32) -> Self {
+        Self {
+            total,
+            done: 0,
+            shown: Instant::now(),
+        }
+    }
+}
+
+impl Observer for Progress {
+    fn hand(&mut self, hand: &Hand) {
+        if matches!(hand, Hand::EndCycle) {
+            self.done += 1;
+            if self.shown.elapsed().as_secs() >= 2 {
+                self.shown = Instant::now();
+                eprintln!("cycle {} of {}", self.done, self.total);
+            }
+        }
+    }
+}
