@@ -1,0 +1,185 @@
+//! A node on a bus of the test's own.
+
+use std::collections::VecDeque;
+
+use firmware::control::controller::Config;
+use firmware::mechanics::arm::IRB_930;
+use firmware::mechanics::dynamics::drive::Drive;
+use firmware::node::Node;
+use nalgebra::Vector4;
+use protocol::bus::{Bus, TransmitError};
+use protocol::codec::{decode, encode};
+use protocol::frame::CanFrame;
+use protocol::messages::{
+    Command, ControlWord, DriveStatus, EStop, EStopReason, Feedback, Hello, Message, Mode, Motion,
+    MotionRequest, Outcome, ParameterRequest, RefusalReason, ResetReason, Server,
+};
+use protocol::table;
+
+pub const PERIOD_US: u64 = 1000;
+
+#[derive(Default)]
+pub struct Wire {
+    pub to_node: VecDeque<CanFrame>,
+    pub from_node: Vec<CanFrame>,
+}
+
+impl Bus for Wire {
+    fn receive(&mut self) -> Option<CanFrame> {
+        self.to_node.pop_front()
+    }
+
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        self.from_node.push(*frame);
+        Ok(())
+    }
+}
+
+/// A node, and an arm that stands still whatever it is told.
+pub struct Bench {
+    pub node: Node,
+    pub wire: Wire,
+    pub now: u64,
+    pub sample: u32,
+    pub feedback_counter: u8,
+    pub motion_counter: u8,
+    pub sequence: u8,
+    pub position: [i32; 4],
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        let drive = Drive::new(&IRB_930.drive);
+        let q = Vector4::new(0.2, 1.5, 0.15, 0.3);
+        Self {
+            node: Node::new(Config::new(IRB_930, 1e-3), ResetReason::Watchdog),
+            wire: Wire::default(),
+            now: 0,
+            sample: 0,
+            feedback_counter: 0,
+            motion_counter: 0,
+            sequence: 0,
+            position: drive.counts_of_motor_angle(&drive.motor_angle(&q)),
+        }
+    }
+
+    /// A bench whose axes are under torque.
+    pub fn enabled() -> Self {
+        let mut bench = Self::new();
+        bench.hello(table::HASH);
+        bench.run(2);
+        assert_eq!(bench.request(MotionRequest::Stop), Some(Outcome::Accepted));
+        assert_eq!(
+            bench.request(MotionRequest::Enable),
+            Some(Outcome::Accepted)
+        );
+        bench.run(100);
+        assert_eq!(bench.mode(), Mode::Enabled);
+        bench
+    }
+
+    pub fn mode(&self) -> Mode {
+        self.node.controller().mode()
+    }
+
+    pub fn next_feedback(&mut self) -> CanFrame {
+        let feedback = Feedback {
+            sample: self.sample,
+            status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
+            position: self.position,
+            velocity: [0.0; 4],
+            torque: [0; 4],
+        };
+        let frame = encode(&Message::Feedback(feedback), self.feedback_counter).unwrap();
+        self.sample += 1;
+        self.feedback_counter = self.feedback_counter.wrapping_add(1);
+        frame
+    }
+
+    pub fn poll(&mut self) -> Vec<Message> {
+        self.node.poll(self.now, &mut self.wire);
+        self.wire
+            .from_node
+            .drain(..)
+            .map(|frame| decode(&frame).expect("a node sends valid frames").message)
+            .collect()
+    }
+
+    /// One sample with what has been put on the wire; returns what the node sent.
+    pub fn step(&mut self) -> Vec<Message> {
+        self.now += PERIOD_US;
+        let frame = self.next_feedback();
+        self.wire.to_node.push_back(frame);
+        self.poll()
+    }
+
+    pub fn run(&mut self, samples: usize) -> Vec<Message> {
+        (0..samples).flat_map(|_| self.step()).collect()
+    }
+
+    pub fn command(&mut self) -> Command {
+        let sent = self.step();
+        let commands: Vec<_> = sent
+            .iter()
+            .filter_map(|message| match message {
+                Message::Command(command) => Some(*command),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(commands.len(), 1, "one command a feedback: {sent:?}");
+        assert_eq!(commands[0].sample, self.sample - 1, "the sample is echoed");
+        commands[0]
+    }
+
+    pub fn hello(&mut self, schema: u32) {
+        let hello = Hello {
+            schema,
+            build: 0,
+            profile: Hello::PROFILE_FD,
+        };
+        let request = Message::ParameterRequest(Server::Controller, ParameterRequest::Hello(hello));
+        self.wire.to_node.push_back(encode(&request, 0).unwrap());
+    }
+
+    pub fn motion(&mut self, request: MotionRequest) -> CanFrame {
+        self.sequence += 1;
+        let motion = Motion {
+            sequence: self.sequence,
+            request,
+        };
+        let frame = encode(&Message::Motion(motion), self.motion_counter).unwrap();
+        self.motion_counter = self.motion_counter.wrapping_add(1);
+        frame
+    }
+
+    pub fn request(&mut self, request: MotionRequest) -> Option<Outcome> {
+        let frame = self.motion(request);
+        self.wire.to_node.push_back(frame);
+        let sequence = self.sequence;
+        self.run(200).iter().find_map(|message| match message {
+            Message::MotionReply(reply) if reply.sequence == sequence => Some(reply.outcome),
+            _ => None,
+        })
+    }
+
+    pub fn refusal(&mut self, request: MotionRequest) -> RefusalReason {
+        match self.request(request) {
+            Some(Outcome::Refused(refusal)) => refusal.reason,
+            other => panic!("{request:?} not refused: {other:?}"),
+        }
+    }
+}
+
+pub fn is_off(command: &Command) -> bool {
+    !command.control.contains(ControlWord::TORQUE_ENABLE)
+        && !command.control.contains(ControlWord::BRAKE_RELEASE)
+        && command.torque == [0.0; 4]
+}
+
+pub fn estop() -> CanFrame {
+    let estop = EStop {
+        reason: EStopReason::UNSPECIFIED,
+        counter: 0,
+    };
+    encode(&Message::EStop(estop), 0).unwrap()
+}

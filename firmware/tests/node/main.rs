@@ -1,0 +1,7 @@
+//! The node on a bus of the test's own: what it answers, what it refuses, and what it ignores.
+
+mod bench;
+mod faults;
+mod reports;
+mod requests;
+mod switching;

@@ -1,0 +1,188 @@
+//! What the node says by itself, how much it does in one call, and what it ignores.
+
+use firmware::control::phase::{Phase, Probe};
+use firmware::node::FRAMES_PER_POLL;
+use proptest::prelude::*;
+use protocol::codec::encode;
+use protocol::frame::{CanFrame, StandardId};
+use protocol::messages::{
+    Message, Mode, MotionRequest, Nmt, NmtCommand, Node as Name, ResetReason, State,
+};
+
+use crate::bench::{Bench, PERIOD_US, estop};
+
+#[test]
+fn work_in_one_call_is_bounded() {
+    let mut bench = Bench::enabled();
+    let estops = 3 * FRAMES_PER_POLL;
+    for _ in 0..estops {
+        bench.wire.to_node.push_back(estop());
+    }
+    bench.poll();
+    assert_eq!(bench.wire.to_node.len(), estops - FRAMES_PER_POLL);
+}
+
+#[test]
+fn state_and_heartbeat_come_at_their_rates() {
+    let mut bench = Bench::enabled();
+    let sent = bench.run(1000);
+    let states: Vec<State> = sent
+        .iter()
+        .filter_map(|m| match m {
+            Message::State(state) => Some(*state),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(states.len(), 50);
+    assert!(
+        states
+            .iter()
+            .all(|s| s.mode == Mode::Enabled && s.queue == 0)
+    );
+    let beats = sent
+        .iter()
+        .filter(|m| matches!(m, Message::Heartbeat(..)))
+        .count();
+    assert_eq!(beats, 10);
+}
+
+#[test]
+fn every_heartbeat_says_why_the_node_was_started() {
+    let reasons: Vec<_> = Bench::enabled()
+        .run(1000)
+        .iter()
+        .filter_map(|message| match message {
+            Message::Heartbeat(Name::Controller, heartbeat) => Some(heartbeat.reset),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(reasons, [ResetReason::Watchdog; 10]);
+}
+
+#[test]
+fn the_state_holds_the_longest_tick() {
+    let mut bench = Bench::new();
+    for cycles in [3000, 170_000, 5] {
+        bench.node.note_tick(cycles);
+    }
+    let worst = bench.run(20).iter().find_map(|message| match message {
+        Message::State(state) => Some(state.worst_tick),
+        _ => None,
+    });
+    assert_eq!(worst, Some(170_000));
+}
+
+#[test]
+fn a_node_asked_to_reset_says_so_and_nothing_more() {
+    for (node, command, asked) in [
+        (0, NmtCommand::ResetNode, true),
+        (Name::Controller.code(), NmtCommand::ResetNode, true),
+        (Name::Drives.code(), NmtCommand::ResetNode, false),
+        (0, NmtCommand::ResetCommunication, false),
+        (0, NmtCommand::Stop, false),
+    ] {
+        let mut bench = Bench::enabled();
+        let nmt = Message::Nmt(Nmt { command, node });
+        bench.wire.to_node.push_back(encode(&nmt, 0).unwrap());
+        let sent = bench.step();
+        assert_eq!(bench.node.reset_asked(), asked, "{command} {node}");
+        assert_eq!(sent.is_empty(), asked, "{command} {node}: {sent:?}");
+    }
+}
+
+fn junk() -> impl Strategy<Value = CanFrame> {
+    let bytes = proptest::collection::vec(any::<u8>(), 0..64);
+    (0u16..0x800, bytes, any::<bool>()).prop_filter_map("no frame", |(id, bytes, fd)| {
+        let id = StandardId::new(id)?;
+        if fd {
+            CanFrame::fd(id, &bytes, true)
+        } else {
+            CanFrame::classical(id, &bytes)
+        }
+    })
+}
+
+proptest! {
+    /// Frames that are none of ours change nothing: same state, same torques, to the bit.
+    #[test]
+    fn junk_changes_nothing(frames in proptest::collection::vec(junk(), 1..30)) {
+        // Some random frames are valid e-stops or NMT commands, which carry no protection, and
+        // three bad feedback frames in a row stop the arm: tested elsewhere.
+        prop_assume!(frames.iter().all(|f| f.raw_id() > 0x001 && f.raw_id() != 0x1C0));
+        let (mut clean, mut dirty) = (Bench::enabled(), Bench::enabled());
+        for frame in frames {
+            dirty.wire.to_node.push_back(frame);
+            prop_assert_eq!(clean.command(), dirty.command());
+            prop_assert_eq!(clean.mode(), dirty.mode());
+        }
+    }
+}
+
+/// A probe that notes what it is told.
+#[derive(Default)]
+struct Marks(Vec<Phase>);
+
+impl Probe for Marks {
+    fn end(&mut self, phase: Phase) {
+        self.0.push(phase);
+    }
+}
+
+#[test]
+fn every_phase_of_a_sample_is_marked_once_and_in_order() {
+    let mut bench = Bench::enabled();
+    let frame = bench.next_feedback();
+    bench.wire.to_node.push_back(frame);
+    let mut marks = Marks::default();
+    bench.now += PERIOD_US;
+    bench.node.poll_with(bench.now, &mut bench.wire, &mut marks);
+    let mut expected = Phase::ALL.to_vec();
+    // After the sample the node has looked for more frames.
+    expected.insert(Phase::ALL.len() - 1, Phase::Decode);
+    assert_eq!(marks.0, expected);
+
+    let mut marks = Marks::default();
+    bench.node.poll_with(bench.now, &mut bench.wire, &mut marks);
+    assert_eq!(marks.0, [Phase::Decode, Phase::Report]);
+}
+
+/// A jump so slow that an arm that stands still does not stand out.
+fn jump() -> MotionRequest {
+    MotionRequest::Jump {
+        target: [0.6, 0.2, -0.25, 0.0],
+        top: -0.2,
+        clearance: 0.01,
+        speed: 1e-3,
+    }
+}
+
+/// No call both plans and reports; reports wait for ten samples at the most.
+#[test]
+fn planning_and_reports_take_turns() {
+    let mut bench = Bench::enabled();
+    let mut planned = 0;
+    for _ in 0..4 {
+        let frame = bench.motion(jump());
+        bench.wire.to_node.push_back(frame);
+    }
+    let mut silent = 0;
+    for _ in 0..300 {
+        let planning = bench.node.controller().is_planning();
+        let rests = (bench.sample + 1).is_multiple_of(10);
+        let sent = bench.step();
+        let reports = sent
+            .iter()
+            .filter(|message| !matches!(message, Message::Command(_)))
+            .count();
+        if planning && !rests {
+            assert_eq!(reports, 0, "sample {}: {sent:?}", bench.sample);
+            planned += 1;
+        }
+        let state = sent
+            .iter()
+            .any(|message| matches!(message, Message::State(_)));
+        silent = if state { 0 } else { silent + 1 };
+        assert!(silent <= 30, "a state every 20 ms, or 10 later");
+    }
+    assert!(planned > 100);
+}

@@ -1,0 +1,162 @@
+//! Switching on and off, and emergency stops.
+
+use firmware::node::PEER_TIMEOUT_US;
+use protocol::messages::{ControlWord, Message, Mode, MotionRequest, Outcome, RefusalReason};
+use protocol::table;
+
+use crate::bench::{Bench, estop, is_off};
+
+#[test]
+fn switching_on_takes_a_known_peer_and_opens_the_brake_under_torque() {
+    let mut bench = Bench::new();
+    assert!(is_off(&bench.command()));
+    assert_eq!(bench.mode(), Mode::PreOperational);
+    bench.hello(table::HASH);
+    bench.run(2);
+    assert_eq!(bench.mode(), Mode::Ready);
+    assert_eq!(bench.request(MotionRequest::Stop), Some(Outcome::Accepted));
+    let enable = bench.motion(MotionRequest::Enable);
+    bench.wire.to_node.push_back(enable);
+    bench.step();
+    assert_eq!(bench.mode(), Mode::Enabling);
+    let opening = bench.command();
+    let both = ControlWord::TORQUE_ENABLE | ControlWord::BRAKE_RELEASE;
+    assert!(opening.control.contains(both));
+    // The weight of lift and shaft, 1.95 kg, on motor 3: m g / (2 pi / 25 mm), within the
+    // feedback's share for half a count.
+    let carried = 1.95 * 9.81 / (std::f32::consts::TAU / 0.025);
+    assert!(
+        (opening.torque[2] + carried).abs() < 0.01 * carried,
+        "{opening:?}"
+    );
+    bench.run(100);
+    assert_eq!(bench.mode(), Mode::Enabled);
+    assert_eq!(
+        bench.request(MotionRequest::Disable),
+        Some(Outcome::Accepted)
+    );
+    assert_eq!(bench.mode(), Mode::Ready);
+    assert!(is_off(&bench.command()));
+}
+
+#[test]
+fn switching_off_closes_the_brake_before_torque_goes() {
+    let mut bench = Bench::enabled();
+    let frame = bench.motion(MotionRequest::Disable);
+    bench.wire.to_node.push_back(frame);
+    let controls: Vec<_> = bench
+        .run(100)
+        .iter()
+        .filter_map(|message| match message {
+            Message::Command(command) => Some(command.control),
+            _ => None,
+        })
+        .collect();
+    let torque = |c: &ControlWord| c.contains(ControlWord::TORQUE_ENABLE);
+    let brake_open = |c: &ControlWord| c.contains(ControlWord::BRAKE_RELEASE);
+    let closing = controls
+        .iter()
+        .filter(|c| torque(c) && !brake_open(c))
+        .count();
+    // The drives' brake takes 30 ms to close.
+    assert!(closing >= 30, "{closing} samples");
+    assert!(
+        controls.iter().all(|c| torque(c) || !brake_open(c)),
+        "never open without torque"
+    );
+    assert!(!torque(controls.last().unwrap()));
+}
+
+#[test]
+fn enable_is_refused_without_a_peer_of_the_same_schema() {
+    let mut bench = Bench::new();
+    bench.run(2);
+    assert_eq!(bench.request(MotionRequest::Stop), Some(Outcome::Accepted));
+    assert_eq!(
+        bench.refusal(MotionRequest::Enable),
+        RefusalReason::SchemaMismatch
+    );
+    bench.hello(table::HASH ^ 1);
+    assert_eq!(
+        bench.refusal(MotionRequest::Enable),
+        RefusalReason::SchemaMismatch
+    );
+    assert_eq!(bench.mode(), Mode::PreOperational);
+}
+
+#[test]
+fn the_first_request_of_an_operator_switches_nothing_on() {
+    let mut bench = Bench::new();
+    bench.hello(table::HASH);
+    bench.run(2);
+    assert_eq!(
+        bench.refusal(MotionRequest::Enable),
+        RefusalReason::WrongState
+    );
+    // The second one is no replay of the first.
+    assert_eq!(
+        bench.request(MotionRequest::Enable),
+        Some(Outcome::Accepted)
+    );
+}
+
+#[test]
+fn a_replayed_enable_is_dropped() {
+    let mut bench = Bench::new();
+    bench.hello(table::HASH);
+    bench.run(2);
+    bench.request(MotionRequest::Stop);
+    let enable = bench.motion(MotionRequest::Enable);
+    bench.wire.to_node.push_back(enable);
+    bench.run(100);
+    assert_eq!(
+        bench.request(MotionRequest::Disable),
+        Some(Outcome::Accepted)
+    );
+    assert_eq!(bench.mode(), Mode::Ready);
+    bench.wire.to_node.push_back(enable);
+    bench.run(100);
+    assert_eq!(bench.mode(), Mode::Ready);
+}
+
+#[test]
+fn an_emergency_stop_is_latched() {
+    let mut bench = Bench::enabled();
+    bench.wire.to_node.push_back(estop());
+    bench.step();
+    assert_eq!(bench.mode(), Mode::EStop);
+    // The lift is never dropped: the brake closes before the torque goes.
+    assert!(bench.command().control.contains(ControlWord::TORQUE_ENABLE));
+    bench.run(200);
+    assert_eq!(bench.mode(), Mode::EStop);
+    assert!(is_off(&bench.command()));
+    assert_eq!(
+        bench.refusal(MotionRequest::Enable),
+        RefusalReason::WrongState
+    );
+    assert_eq!(
+        bench.request(MotionRequest::FaultReset),
+        Some(Outcome::Accepted)
+    );
+    bench.run(2);
+    assert_eq!(bench.mode(), Mode::Ready);
+}
+
+#[test]
+fn a_peer_that_goes_silent_during_an_emergency_stop_leaves_no_torque() {
+    let mut bench = Bench::enabled();
+    bench.wire.to_node.push_back(estop());
+    bench.step();
+    assert!(
+        bench
+            .node
+            .controller()
+            .control_word()
+            .contains(ControlWord::TORQUE_ENABLE)
+    );
+    bench.now += PEER_TIMEOUT_US + 1;
+    bench.poll();
+    assert_eq!(bench.mode(), Mode::EStop);
+    let word = bench.node.controller().control_word();
+    assert_eq!(word, ControlWord::ESTOP);
+}
