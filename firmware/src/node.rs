@@ -394,6 +394,9 @@ impl Node {
             law: selection.law,
             compensation: selection.compensation,
             tracking_error: (*controller.following_error()).into(),
+            fault_axis: protocol::messages::FaultAxis::None,
+            fault_value: 0.0,
+            fault_limit: 0.0,
         }
     }
 

@@ -4,8 +4,8 @@ use plant_sim::monitor::Monitor;
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, Compensation, DriveStatus, Emergency, Feedback, Law, LimitFlags, Message, Mode, Node,
-    State,
+    Cause, Compensation, DriveStatus, Emergency, FaultAxis, Feedback, Law, LimitFlags, Message,
+    Mode, Node, State,
 };
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -43,6 +43,9 @@ fn state(mode: Mode, cause: Cause) -> CanFrame {
         law: Law::Pid,
         compensation: Compensation::Integral,
         tracking_error: [0.0; 4],
+        fault_axis: FaultAxis::Lift,
+        fault_value: 2.5,
+        fault_limit: 2.42,
     };
     codec::encode(&Message::State(state), 0).unwrap()
 }

@@ -1,7 +1,7 @@
 //! The fields of every message, byte by byte, as the [`table`](crate::table) lists them.
 
 use crate::messages::{
-    Cause, Compensation, ControlWord, DriveStatus, Law, LimitFlags, Mode, MotionRequest,
+    Cause, Compensation, ControlWord, DriveStatus, FaultAxis, Law, LimitFlags, Mode, MotionRequest,
     NmtCommand, Outcome, ParameterError, ParameterReply, ParameterRequest, RefusalReason,
     ResetReason,
 };
@@ -170,6 +170,10 @@ pub const STATE: &[Signal] = &[
         one!(""),
     ),
     signal("tracking_error", 16, ANY, JOINTS),
+    signal("fault_axis", 32, Kind::Code(FaultAxis::CODES), one!("")),
+    // The unit depends on the cause.
+    signal("fault_value", 33, ANY, one!("")),
+    signal("fault_limit", 37, ANY, one!("")),
 ];
 
 /// Answer to a request.

@@ -259,10 +259,40 @@ fn state() {
             law: Law::ComputedTorqueJoint,
             compensation: Compensation::Integral,
             tracking_error: [0.5, -0.25, 0.125, -1.0],
+            // What the frame had no field for yet: zeros, as the padding was.
+            fault_axis: FaultAxis::None,
+            fault_value: 0.0,
+            fault_limit: 0.0,
         }),
         128,
         "300##1090B003803090201FFFF1098020004010000003F000080BE0000003E000080BF000000000000000000\
         0000000080272E",
+    );
+}
+
+/// A fault with its axis and number, in what was padding before.
+#[test]
+fn state_with_a_fault() {
+    check(
+        Message::State(State {
+            mode: Mode::FaultReaction,
+            cause: Cause::FollowingError,
+            limits: LimitFlags::TORQUE_LIFT | LimitFlags::PREDICTED,
+            queue: 0,
+            completed: 7,
+            overruns: 1,
+            rejected: 2,
+            worst_tick: 0,
+            law: Law::ComputedTorqueJoint,
+            compensation: Compensation::Observer,
+            tracking_error: [0.5, -0.25, 0.0021, -1.0],
+            fault_axis: FaultAxis::Lift,
+            fault_value: 0.0021,
+            fault_limit: 0.002,
+        }),
+        129,
+        "300##1080B04200007010002000000000004020000003F000080BE27A0093B000080BF0327A0093B6F12033\
+        B0000000081624D",
     );
 }
 

@@ -144,6 +144,9 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
             one("law", m.law.code()),
             one("compensation", m.compensation.code()),
             many("tracking_error", m.tracking_error),
+            one("fault_axis", m.fault_axis.code()),
+            one("fault_value", m.fault_value),
+            one("fault_limit", m.fault_limit),
         ],
         Message::MotionReply(m) => match m.outcome {
             Outcome::Accepted => vec![one("sequence", m.sequence), one("outcome", 0)],

@@ -38,10 +38,6 @@ fn names() -> String {
         .join(", ")
 }
 
-fn takes_compensation(law: Law) -> bool {
-    matches!(law, Law::ComputedTorqueJoint | Law::ComputedTorqueTask)
-}
-
 impl FromStr for LawChoice {
     type Err = LawError;
 
@@ -52,9 +48,9 @@ impl FromStr for LawChoice {
         };
         let law = Law::from_name(name).ok_or_else(|| LawError::Law(name.into()))?;
         let compensation = match suffix {
-            None if takes_compensation(law) => Compensation::Observer,
+            None if law.takes_compensation() => Compensation::Observer,
             None => Compensation::None,
-            Some(_) if !takes_compensation(law) => return Err(LawError::NotTaken(law)),
+            Some(_) if !law.takes_compensation() => return Err(LawError::NotTaken(law)),
             Some(suffix) => Compensation::from_name(suffix)
                 .ok_or_else(|| LawError::Compensation(suffix.into()))?,
         };
@@ -72,7 +68,7 @@ impl TryFrom<String> for LawChoice {
 
 impl fmt::Display for LawChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if takes_compensation(self.law) {
+        if self.law.takes_compensation() {
             write!(f, "{}:{}", self.law, self.compensation)
         } else {
             write!(f, "{}", self.law)
@@ -88,7 +84,7 @@ mod tests {
     fn every_name_reads_back_as_written() {
         for law in Law::ALL {
             for compensation in Compensation::ALL {
-                let taken = takes_compensation(*law);
+                let taken = law.takes_compensation();
                 let choice = LawChoice {
                     law: *law,
                     compensation: if taken {

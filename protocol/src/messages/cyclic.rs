@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Cause, Compensation, Law, Mode};
+use super::{Cause, Compensation, Fault, FaultAxis, Law, Mode};
 use crate::codes::bits;
 
 /// Drives to controller, every sample: state of the motors at the sampling instant.
@@ -96,6 +96,26 @@ pub struct State {
     pub compensation: Compensation,
     /// Reference minus measurement, joint units (rad, rad, m, rad).
     pub tracking_error: [f32; 4],
+    /// Axis of the latched fault. This field and those after it came later and lie in what was padding: 0 in frames of
+    /// older nodes.
+    pub fault_axis: FaultAxis,
+    /// Value that led to the latched fault, in the unit of [`Fault::unit`].
+    pub fault_value: f32,
+    /// What is allowed instead, in the same unit; 0 if that is no number.
+    pub fault_limit: f32,
+}
+
+impl State {
+    /// The latched fault.
+    #[must_use]
+    pub const fn fault(&self) -> Fault {
+        Fault {
+            cause: self.cause,
+            axis: self.fault_axis,
+            value: self.fault_value,
+            limit: self.fault_limit,
+        }
+    }
 }
 
 bits! {
@@ -109,23 +129,23 @@ bits! {
         TORQUE_LIFT = 2, "torque-lift";
         /// Torque of the wrist motor.
         TORQUE_WRIST = 3, "torque-wrist";
-        /// Speed of the shoulder.
+        /// Speed of the shoulder. Reserved: not raised yet.
         VELOCITY_SHOULDER = 4, "velocity-shoulder";
-        /// Speed of the elbow.
+        /// Speed of the elbow. Reserved: not raised yet.
         VELOCITY_ELBOW = 5, "velocity-elbow";
-        /// Speed of the lift.
+        /// Speed of the lift. Reserved: not raised yet.
         VELOCITY_LIFT = 6, "velocity-lift";
-        /// Speed of the wrist.
+        /// Speed of the wrist. Reserved: not raised yet.
         VELOCITY_WRIST = 7, "velocity-wrist";
-        /// Shoulder at its soft limit.
+        /// Shoulder at its soft limit. Reserved: not raised yet.
         POSITION_SHOULDER = 8, "position-shoulder";
-        /// Elbow at its soft limit.
+        /// Elbow at its soft limit. Reserved: not raised yet.
         POSITION_ELBOW = 9, "position-elbow";
-        /// Lift at its soft limit.
+        /// Lift at its soft limit. Reserved: not raised yet.
         POSITION_LIFT = 10, "position-lift";
-        /// Wrist at its soft limit.
+        /// Wrist at its soft limit. Reserved: not raised yet.
         POSITION_WRIST = 11, "position-wrist";
-        /// Jacobian inverse damped near the stretched arm.
+        /// Jacobian inverse damped near the stretched arm. Reserved: not raised yet.
         DAMPED = 12, "damped";
         /// A lost sample was bridged by prediction.
         PREDICTED = 13, "predicted";

@@ -5,11 +5,13 @@
 //! positive downwards, as do forces.
 
 mod cyclic;
+mod fault;
 mod motion;
 mod parameter;
 mod service;
 
 pub use cyclic::{Command, ControlWord, DriveStatus, Feedback, LimitFlags, State};
+pub use fault::{Fault, FaultAxis, KnownAnswer, Unit};
 pub use motion::{
     Compensation, Law, Motion, MotionReply, MotionRequest, Outcome, Refusal, RefusalReason,
 };

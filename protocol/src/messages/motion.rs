@@ -139,6 +139,17 @@ codes! {
     }
 }
 
+impl Law {
+    /// Whether the law can be helped by a [`Compensation`] other than none.
+    #[must_use]
+    pub const fn takes_compensation(self) -> bool {
+        match self {
+            Self::ComputedTorqueJoint | Self::ComputedTorqueTask => true,
+            Self::KinematicJoint | Self::KinematicTask | Self::Pid | Self::PdGravity => false,
+        }
+    }
+}
+
 codes! {
     /// What a law has against constant disturbances.
     pub enum Compensation {
@@ -248,5 +259,7 @@ codes! {
         TorqueTooSmall = 12, "torque-too-small";
         /// A stop came before the move was planned.
         Stopped = 13, "stopped";
+        /// The law takes no compensation.
+        NoCompensation = 14, "no-compensation";
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Fault;
 use crate::codes::codes;
 
 codes! {
@@ -83,12 +84,25 @@ pub struct Emergency {
     pub register: u8,
     /// Latched cause.
     pub cause: Cause,
-    /// Detail whose meaning depends on the cause.
+    /// Value that led to the fault, as the bits of an f32 in the unit of [`Fault::unit`].
     #[serde(with = "postcard::fixint::le")]
     pub data: u32,
 }
 
 impl Emergency {
+    /// Value that led to the fault; 0 if the bits are no finite number. Its unit is that of [`Emergency::fault`].
+    #[must_use]
+    pub const fn value(&self) -> f32 {
+        let value = f32::from_bits(self.data);
+        if value.is_finite() { value } else { 0.0 }
+    }
+
+    /// The fault, as far as eight bytes can tell it: the [`State`](super::State) that follows has axis and limit as well.
+    #[must_use]
+    pub const fn fault(&self) -> Fault {
+        Fault::value(self.cause, self.value(), 0.0)
+    }
+
     /// Emergency of this cause, with the code and register that CiA 301 and CiA 402 give it.
     #[must_use]
     pub const fn new(cause: Cause, data: u32) -> Self {
@@ -168,7 +182,7 @@ codes! {
     pub enum Cause {
         /// No fault.
         None = 0, "none";
-        /// A known answer, a parameter or the timer was wrong at start.
+        /// A known answer or the robot model was wrong at start.
         SelfTest = 1, "self-test";
         /// Too many feedback frames in a row did not arrive.
         FeedbackLost = 2, "feedback-lost";
@@ -178,32 +192,34 @@ codes! {
         Reordered = 4, "reordered";
         /// Frames arrived with a wrong end-to-end checksum.
         Corrupted = 5, "corrupted";
-        /// Another node sends on our peer's identifier, or a log is replayed.
+        /// Another node sends on our peer's identifier, or a log is replayed. Reserved: not raised yet.
         DuplicateNode = 6, "duplicate-node";
-        /// A position stands still although the axis must be moving.
+        /// A position stands still although the axis must be moving. Reserved: not raised yet.
         StuckSensor = 7, "stuck-sensor";
-        /// A node floods the bus.
+        /// A node floods the bus. Reserved: not raised yet.
         Babbling = 8, "babbling";
-        /// The CAN controller has taken itself off the bus.
+        /// The CAN controller has taken itself off the bus. Reserved: not raised yet.
         BusOff = 9, "bus-off";
-        /// Frames arrived with values that are not numbers or out of range.
+        /// Values that are not numbers or out of range: in frames that arrived, or as the result of a control law.
         BadValue = 10, "bad-value";
         /// An axis is too far from its reference.
         FollowingError = 11, "following-error";
         /// An axis is faster than allowed.
         OverSpeed = 12, "over-speed";
-        /// An axis has needed more torque than allowed for too long.
+        /// An axis has needed more torque than allowed for too long. Reserved: not raised yet.
         OverTorque = 13, "over-torque";
         /// An axis has left its range.
         SoftLimit = 14, "soft-limit";
-        /// The control step took longer than a sample, several times in a row.
+        /// The control step took longer than a sample, several times in a row. Reserved: not raised yet.
         Overrun = 15, "overrun";
         /// The emergency stop was pressed or sent.
         EStop = 16, "estop";
         /// The drives report a fault.
         DriveFault = 17, "drive-fault";
-        /// The peer was built from another message table.
+        /// The peer was built from another message table. Reserved: not raised yet.
         SchemaMismatch = 18, "schema-mismatch";
+        /// An encoder is not valid, or its position has moved further than the axis can in that time.
+        EncoderFault = 19, "encoder-fault";
     }
 }
 
@@ -216,7 +232,7 @@ impl Cause {
             Self::DriveFault => 0x5000,
             Self::SelfTest | Self::Overrun => 0x6100,
             Self::SchemaMismatch => 0x6300,
-            Self::StuckSensor => 0x7300,
+            Self::StuckSensor | Self::EncoderFault => 0x7300,
             Self::Babbling => 0x8110,
             Self::PeerSilent => 0x8130,
             Self::BusOff => 0x8140,

@@ -119,8 +119,9 @@ fn state() -> impl Strategy<Value = Message> {
         any::<(u8, u8, u16, u16, u32)>(),
         (select(Law::ALL), select(Compensation::ALL)),
         uniform4(any_f32()),
+        (select(FaultAxis::ALL), any_f32(), any_f32()),
     )
-        .prop_map(|(status, counts, selected, tracking_error)| {
+        .prop_map(|(status, counts, selected, tracking_error, fault)| {
             Message::State(State {
                 mode: status.0,
                 cause: status.1,
@@ -133,6 +134,9 @@ fn state() -> impl Strategy<Value = Message> {
                 law: selected.0,
                 compensation: selected.1,
                 tracking_error,
+                fault_axis: fault.0,
+                fault_value: fault.1,
+                fault_limit: fault.2,
             })
         })
 }

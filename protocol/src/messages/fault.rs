@@ -1,0 +1,198 @@
+//! A fault with its axis and number, and how a person reads it.
+
+use core::fmt::{self, Write};
+
+use super::{Cause, DriveStatus};
+use crate::codes::codes;
+
+codes! {
+    /// Axis of a fault.
+    pub enum FaultAxis {
+        /// No single axis.
+        None = 0, "none";
+        /// Axis 1: turns arm 1.
+        Shoulder = 1, "shoulder";
+        /// Axis 2: turns arm 2.
+        Elbow = 2, "elbow";
+        /// Axis 3: moves the shaft along z.
+        Lift = 3, "lift";
+        /// Axis 4: turns the shaft.
+        Wrist = 4, "wrist";
+    }
+}
+
+codes! {
+    /// Known answers of the self-test.
+    pub enum KnownAnswer {
+        /// Sine and cosine of an angle.
+        Sine = 1, "sine";
+        /// Pose of a joint position, and the way back.
+        Kinematics = 2, "kinematics";
+        /// Check values of the end-to-end CRCs.
+        Crc = 3, "crc";
+        /// Every number of the robot model is in its range.
+        Model = 4, "model";
+    }
+}
+
+/// A fault as [`State`](super::State) reports it while it is latched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Fault {
+    /// What is wrong.
+    pub cause: Cause,
+    /// Where, if one axis is concerned.
+    pub axis: FaultAxis,
+    /// What was found, in [`Fault::unit`].
+    pub value: f32,
+    /// What is allowed, in the same unit; 0 if that is no number.
+    pub limit: f32,
+}
+
+/// Unit of a fault's number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unit {
+    /// There is no number.
+    None,
+    /// Angle, rad.
+    Radian,
+    /// Length, m.
+    Metre,
+    /// Angle or length: the axis is not known.
+    RadianOrMetre,
+    /// rad/s.
+    RadianPerSecond,
+    /// m/s.
+    MetrePerSecond,
+    /// Either speed: the axis is not known.
+    SpeedOfAxis,
+    /// ms.
+    Millisecond,
+    /// Frames in a row.
+    Frame,
+    /// Bits of a [`DriveStatus`].
+    DriveStatus,
+    /// Code of a [`KnownAnswer`].
+    KnownAnswer,
+}
+
+impl Unit {
+    /// Symbol of the unit on the wire; empty where the number is a code.
+    #[must_use]
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::None | Self::DriveStatus | Self::KnownAnswer => "",
+            Self::Radian => "rad",
+            Self::Metre => "m",
+            Self::RadianOrMetre => "rad or m",
+            Self::RadianPerSecond => "rad/s",
+            Self::MetrePerSecond => "m/s",
+            Self::SpeedOfAxis => "rad/s or m/s",
+            Self::Millisecond => "ms",
+            Self::Frame => "frames",
+        }
+    }
+
+    fn show(self, value: f32, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::None => Ok(()),
+            Self::Metre => write!(f, "{:.1} mm", value * 1e3),
+            Self::Radian => write!(f, "{value:.3} rad"),
+            Self::RadianPerSecond | Self::MetrePerSecond => {
+                write!(f, "{value:.2} {}", self.symbol())
+            }
+            Self::RadianOrMetre | Self::SpeedOfAxis => write!(f, "{value:.4} {}", self.symbol()),
+            Self::Millisecond => write!(f, "{value:.1} ms"),
+            Self::Frame => write!(f, "{value:.0} frames in a row"),
+            Self::DriveStatus => {
+                f.write_str("drive status")?;
+                let mut bits = value as u8;
+                for name in DriveStatus::NAMES {
+                    if bits & 1 == 1 {
+                        write!(f, " {name}")?;
+                    }
+                    bits >>= 1;
+                }
+                Ok(())
+            }
+            Self::KnownAnswer => match KnownAnswer::try_from(value as u8) {
+                Ok(answer) => f.write_str(answer.name()),
+                Err(unknown) => write!(f, "{unknown}"),
+            },
+        }
+    }
+}
+
+impl Fault {
+    /// Nothing is wrong.
+    pub const NONE: Self = Self::because(Cause::None);
+
+    /// A fault that has neither axis nor number.
+    #[must_use]
+    pub const fn because(cause: Cause) -> Self {
+        Self::value(cause, 0.0, 0.0)
+    }
+
+    /// A fault of no single axis; `limit` is 0 if there is none.
+    #[must_use]
+    pub const fn value(cause: Cause, value: f32, limit: f32) -> Self {
+        Self {
+            cause,
+            axis: FaultAxis::None,
+            value,
+            limit,
+        }
+    }
+
+    /// Unit of value and limit.
+    #[must_use]
+    pub const fn unit(&self) -> Unit {
+        use FaultAxis::{Lift, None};
+        match (self.cause, self.axis) {
+            (Cause::SelfTest, _) => Unit::KnownAnswer,
+            (Cause::DriveFault, _) | (Cause::EncoderFault, None) => Unit::DriveStatus,
+            (Cause::FeedbackLost | Cause::PeerSilent, _) => Unit::Millisecond,
+            (Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => Unit::Frame,
+            (Cause::FollowingError | Cause::SoftLimit, None) => Unit::RadianOrMetre,
+            (Cause::FollowingError | Cause::SoftLimit | Cause::EncoderFault, Lift) => Unit::Metre,
+            (Cause::FollowingError | Cause::SoftLimit | Cause::EncoderFault, _) => Unit::Radian,
+            (Cause::OverSpeed, None) => Unit::SpeedOfAxis,
+            (Cause::OverSpeed, Lift) => Unit::MetrePerSecond,
+            (Cause::OverSpeed, _) => Unit::RadianPerSecond,
+            (
+                Cause::None
+                | Cause::DuplicateNode
+                | Cause::StuckSensor
+                | Cause::Babbling
+                | Cause::BusOff
+                | Cause::OverTorque
+                | Cause::Overrun
+                | Cause::EStop
+                | Cause::SchemaMismatch,
+                _,
+            ) => Unit::None,
+        }
+    }
+}
+
+/// As in "following error, axis 3 (lift): 2.1 mm, limit 2.0 mm".
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for c in self.cause.name().chars() {
+            f.write_char(if c == '-' { ' ' } else { c })?;
+        }
+        if self.axis != FaultAxis::None {
+            write!(f, ", axis {} ({})", self.axis.code(), self.axis)?;
+        }
+        let unit = self.unit();
+        if unit != Unit::None && self.value != 0.0 {
+            f.write_str(": ")?;
+            unit.show(self.value, f)?;
+            if self.limit != 0.0 {
+                f.write_str(", limit ")?;
+                unit.show(self.limit, f)?;
+            }
+        }
+        Ok(())
+    }
+}

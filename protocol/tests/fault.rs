@@ -1,0 +1,80 @@
+//! Faults in words, and what an emergency keeps of them.
+
+use protocol::messages::{Cause, DriveStatus, Emergency, Fault, FaultAxis, KnownAnswer};
+
+/// Sentences written by hand.
+#[test]
+fn a_fault_reads_as_a_sentence_with_axis_and_unit() {
+    let of_axis = |cause, axis, value, limit| Fault {
+        cause,
+        axis,
+        value,
+        limit,
+    };
+    use FaultAxis::{Elbow, Lift, Shoulder, Wrist};
+    let status = DriveStatus::READY | DriveStatus::FAULT;
+    for (fault, sentence) in [
+        (
+            of_axis(Cause::FollowingError, Lift, 0.0021, 0.002),
+            "following error, axis 3 (lift): 2.1 mm, limit 2.0 mm",
+        ),
+        (
+            of_axis(Cause::FollowingError, Shoulder, -0.0613, 0.05),
+            "following error, axis 1 (shoulder): -0.061 rad, limit 0.050 rad",
+        ),
+        (
+            of_axis(Cause::OverSpeed, Elbow, 13.5, 13.439),
+            "over speed, axis 2 (elbow): 13.50 rad/s, limit 13.44 rad/s",
+        ),
+        (
+            of_axis(Cause::OverSpeed, Lift, -2.5, 2.42),
+            "over speed, axis 3 (lift): -2.50 m/s, limit 2.42 m/s",
+        ),
+        (
+            of_axis(Cause::SoftLimit, Wrist, 7.1, 7.0313),
+            "soft limit, axis 4 (wrist): 7.100 rad, limit 7.031 rad",
+        ),
+        (
+            of_axis(Cause::EncoderFault, Lift, 0.2, 0.0342),
+            "encoder fault, axis 3 (lift): 200.0 mm, limit 34.2 mm",
+        ),
+        (
+            Fault::value(Cause::EncoderFault, f32::from(status.bits()), 0.0),
+            "encoder fault: drive status ready fault",
+        ),
+        (
+            Fault::value(Cause::DriveFault, f32::from(status.bits()), 0.0),
+            "drive fault: drive status ready fault",
+        ),
+        (
+            Fault::value(Cause::FeedbackLost, 6.0, 5.0),
+            "feedback lost: 6.0 ms, limit 5.0 ms",
+        ),
+        (
+            Fault::value(Cause::Corrupted, 3.0, 0.0),
+            "corrupted: 3 frames in a row",
+        ),
+        (
+            Fault::value(Cause::SelfTest, f32::from(KnownAnswer::Crc.code()), 0.0),
+            "self test: crc",
+        ),
+        (Fault::because(Cause::EStop), "estop"),
+        (Fault::NONE, "none"),
+    ] {
+        assert_eq!(fault.to_string(), sentence);
+    }
+}
+
+/// Eight bytes have no room for the axis, so that the unit stays open where it depends on it.
+#[test]
+fn an_emergency_keeps_the_value() {
+    let emergency = Emergency::new(Cause::FollowingError, 0.0021f32.to_bits());
+    assert_eq!(emergency.value(), 0.0021);
+    assert_eq!(
+        emergency.fault().to_string(),
+        "following error: 0.0021 rad or m"
+    );
+    let nonsense = Emergency::new(Cause::OverSpeed, f32::NAN.to_bits());
+    assert_eq!(nonsense.value(), 0.0);
+    assert_eq!(nonsense.fault().to_string(), "over speed");
+}
