@@ -10,32 +10,32 @@ use protocol::codec::{self, DecodeError};
 use protocol::counters::Counters;
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::messages::{
-    Cause, Command, Emergency, Feedback, Heartbeat, Hello, LimitFlags, Message, Motion,
-    MotionRequest, NmtCommand, ParameterReply, ParameterRequest, Refusal, RefusalReason,
-    ResetReason, Server, State,
+    Cause, Command, DriveStatus, Emergency, Fault, Feedback, Heartbeat, Hello, Message, Mode,
+    Motion, MotionRequest, NmtCommand, Node as Name, ParameterReply, ParameterRequest, Refusal,
+    RefusalReason, ResetReason, Server, State,
 };
-use protocol::messages::{Mode, Node as Name};
 use protocol::table;
 
 use crate::control::controller::{Config, Controller, Readings};
-use crate::control::mode::Event;
+use crate::control::fault::{BAD_FRAMES, PEER_TIMEOUT_MS};
 use crate::control::phase::{Phase, Probe};
 use crate::control::self_test;
+use crate::control::states::Event;
 
 /// Frames taken from the bus in one call; more wait for the next.
 pub const FRAMES_PER_POLL: usize = 8;
 /// Age of the feedback, µs, at which the drives count as silent: torque off, brake.
-pub const PEER_TIMEOUT_US: u64 = 100_000;
+pub const PEER_TIMEOUT_US: u64 = PEER_TIMEOUT_MS as u64 * 1000;
 /// Period of the state message, µs.
 const STATE_PERIOD_US: u64 = 20_000;
 /// Period of the heartbeat, µs.
 const HEARTBEAT_PERIOD_US: u64 = 100_000;
-/// Planning rests in every tenth sample, so that what is to be reported waits no longer.
+/// Planning rests in every tenth sample, so that what is to be reported waits no longer: half the period of the state at
+/// 1 kHz, for a tenth of the planning. In samples and not in time, so that the same feedback gives the same torques.
 const REPORT_SAMPLES: u32 = 10;
-/// Answers that may wait for such a sample.
+/// Answers that may wait for such a sample; with more, reports come beside planning. Two leave the outbox room for a request
+/// in every sample until then.
 const MAX_ANSWERS_WAITING: usize = 2;
-/// Rejected, stale or duplicate feedback frames in a row that stop the arm.
-const MAX_BAD_FEEDBACK: u8 = 3;
 
 /// Transmit counters, one an identifier.
 #[derive(Clone, Copy, Debug, Default)]
@@ -140,8 +140,14 @@ impl Node {
     pub fn poll_with<B: Bus, P: Probe>(&mut self, now: u64, bus: &mut B, probe: &mut P) {
         if self.controller.mode() == Mode::SelfTest {
             match self_test::run(self.controller.arm()) {
-                Ok(()) => self.controller.event(Event::SelfTestPassed, Cause::None),
-                Err(()) => self.controller.latch(Cause::SelfTest),
+                Ok(()) => {
+                    self.controller.event(Event::SelfTestPassed);
+                }
+                Err(answer) => self.controller.fail(Fault::value(
+                    Cause::SelfTest,
+                    f32::from(answer.code()),
+                    0.0,
+                )),
             }
         }
         let mut planned = false;
@@ -192,7 +198,7 @@ impl Node {
                     self.motion(motion, verdict);
                 }
             }
-            Message::EStop(_) => self.controller.event(Event::EmergencyStop, Cause::EStop),
+            Message::EStop(_) => self.controller.fail(Fault::because(Cause::EStop)),
             Message::ParameterRequest(Server::Controller, request) => {
                 let verdict = self.parameter.judge(counter);
                 if self.admit(verdict) {
@@ -224,8 +230,11 @@ impl Node {
             Some((last, _)) => feedback.sample.wrapping_sub(last).max(1),
         };
         self.newest = Some((feedback.sample, now));
-        if self.controller.mode() == Mode::PreOperational && self.same_schema {
-            self.controller.event(Event::PeerReady, Cause::None);
+        if self.controller.mode() == Mode::PreOperational
+            && self.same_schema
+            && feedback.status.contains(DriveStatus::ENCODER_VALID)
+        {
+            self.controller.event(Event::PeerReady);
         }
         let rated = self.controller.arm().drive.motor_torque_rated * 1e-3;
         let [t1, t2, t3, t4] = feedback.torque.map(f32::from);
@@ -310,8 +319,10 @@ impl Node {
         self.received.refuse(&error);
         if table::FEEDBACK.identifies(frame) {
             self.suspect(match error {
-                DecodeError::Crc => Cause::Corrupted,
-                _ => Cause::BadValue,
+                DecodeError::Value(_) | DecodeError::Malformed | DecodeError::NotCanonical => {
+                    Cause::BadValue
+                }
+                _ => Cause::Corrupted,
             });
         }
     }
@@ -319,8 +330,10 @@ impl Node {
     /// Several bad feedback frames in a row stop the arm.
     fn suspect(&mut self, cause: Cause) {
         self.bad_feedback = self.bad_feedback.saturating_add(1);
-        if self.bad_feedback >= MAX_BAD_FEEDBACK {
-            self.controller.event(Event::Fail, cause);
+        if self.bad_feedback >= BAD_FRAMES {
+            let frames = f32::from(self.bad_feedback);
+            self.bad_feedback = 0;
+            self.controller.fail(Fault::value(cause, frames, 0.0));
         }
     }
 
@@ -329,8 +342,14 @@ impl Node {
         let Some((_, arrived)) = self.newest else {
             return;
         };
-        if now.saturating_sub(arrived) > PEER_TIMEOUT_US {
-            self.controller.event(Event::PeerLost, Cause::PeerSilent);
+        let age = now.saturating_sub(arrived);
+        if age > PEER_TIMEOUT_US {
+            let age_ms = age as f32 * 1e-3;
+            self.controller.fail(Fault::value(
+                Cause::PeerSilent,
+                age_ms,
+                PEER_TIMEOUT_MS as f32,
+            ));
             self.newest = None;
             self.feedback.reset();
             self.same_schema = false;
@@ -346,6 +365,8 @@ impl Node {
             self.send(&Message::MotionReply(reply), counter, bus);
         }
         if let Some(alarm) = self.controller.take_alarm() {
+            // The state that follows at once says which axis it was.
+            self.next_state = now;
             let emergency = Emergency::new(alarm.cause, alarm.value.to_bits());
             let counter = self.sequence.emergency;
             self.sequence.emergency = counter.wrapping_add(1);
@@ -379,13 +400,16 @@ impl Node {
         }
     }
 
-    fn state(&self) -> State {
+    /// The report; takes the limits that have acted since the last one.
+    fn state(&mut self) -> State {
+        let limits = self.controller.take_limits();
         let controller = &self.controller;
+        let fault = controller.fault();
         let selection = controller.selection();
         State {
             mode: controller.mode(),
-            cause: controller.cause(),
-            limits: LimitFlags::from_bits(controller.limited()).unwrap_or(LimitFlags::EMPTY),
+            cause: fault.cause,
+            limits,
             queue: controller.queued(),
             completed: controller.completed(),
             overruns: self.overruns,
@@ -394,9 +418,9 @@ impl Node {
             law: selection.law,
             compensation: selection.compensation,
             tracking_error: (*controller.following_error()).into(),
-            fault_axis: protocol::messages::FaultAxis::None,
-            fault_value: 0.0,
-            fault_limit: 0.0,
+            fault_axis: fault.axis,
+            fault_value: fault.value,
+            fault_limit: fault.limit,
         }
     }
 

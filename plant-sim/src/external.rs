@@ -22,7 +22,6 @@ use std::time::{Duration, Instant};
 
 use firmware::cabinet::sample_clock::SampleClock;
 use firmware::control::controller::Config;
-use firmware::control::mode::is_powered;
 use firmware::node::Node;
 use link::{Link, LinkAddress};
 use protocol::bus::{Bus, TransmitError};
@@ -87,7 +86,7 @@ impl Remote {
 
     /// A controller that starts while its twin moves the arm has died in between: nothing of the run is left in it.
     fn refuse_restart(&self, frame: &CanFrame, twin: &Node) -> Result<(), EndpointError> {
-        if is_starting(frame) && is_powered(twin.controller().mode()) {
+        if is_starting(frame) && twin.controller().state().is_powered() {
             return Err(self.error("has started again in the middle of the run"));
         }
         Ok(())

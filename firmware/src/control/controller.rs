@@ -1,29 +1,30 @@
 //! One sample of control: drive readings in, motor torques out.
 //!
 //! ```text
-//! readings -> joints -> monitor -> mode -> reference -> control law -> torque limits -> torques
+//! readings -> joints -> monitor -> state -> reference -> control law -> torque limits -> torques
 //! ```
 //!
 //! There is one call and it is total: every input gives an output, the work is bounded, nothing
 //! is allocated and no clock is read. Time is the number of samples.
 
-mod modes;
 mod motion;
 mod requests;
+mod transitions;
 
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
-    Cause, Compensation, ControlWord, DriveStatus, Law, Mode, MotionReply, MotionRequest, Outcome,
-    Refusal,
+    Cause, Compensation, ControlWord, DriveStatus, Fault, Law, LimitFlags, Mode, MotionReply,
+    MotionRequest, Outcome, Refusal,
 };
 use serde::{Deserialize, Serialize};
 
+use crate::control::fault::MAX_GAP_MS;
 use crate::control::laws::{Gains, Memory, Model, Motion, Selection, Situation, Task};
 use crate::control::limits;
-use crate::control::mode::{self, Event};
-use crate::control::monitor::{Finding, Monitor, MonitorLimits};
+use crate::control::monitor::{Monitor, MonitorLimits};
 use crate::control::phase::{Phase, Probe};
+use crate::control::states::State;
 use crate::mechanics::arm::{ArmModel, Payload};
 use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Trig;
@@ -32,8 +33,15 @@ use crate::trajectory::Reference;
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use requests::Answer;
 
-/// Samples that a gap in the feedback may span before the arm is stopped.
-pub const MAX_GAP: u32 = 5;
+/// Time from a sample until its command acts, s: on the simulated bus the feedback takes 115 µs, computing 40 µs and the
+/// command 74 µs, and as much as another short frame may be in the way.
+const COMMAND_DELAY: f32 = 0.25e-3;
+/// Time that the brake is given, s: the simulated one opens within 50 ms and closes within 30 ms.
+const BRAKE_DELAY: f32 = 0.06;
+/// Steps of planning for each millisecond of the sampling period.
+const PLANNING_STEPS_PER_MS: f32 = 1.0;
+/// Most steps of planning in a sample: at 100 Hz and slower, planning is as fast as at 100 Hz.
+const MAX_PLANNING_STEPS: f32 = 10.0;
 
 /// Everything a controller is told before it starts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -66,8 +74,8 @@ impl Config {
                 gains: Gains::for_period(period),
             },
             period,
-            command_delay: 0.25e-3,
-            brake_delay: 0.06,
+            command_delay: COMMAND_DELAY,
+            brake_delay: BRAKE_DELAY,
             monitor: MonitorLimits::DEFAULT,
         }
     }
@@ -97,17 +105,6 @@ pub struct Actions {
     pub torque: [f32; 4],
 }
 
-/// Progress of switching off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Shutdown {
-    /// Coming to rest on the path.
-    Stopping,
-    /// The brake closes; torque still holds the arm. Samples left.
-    Closing(u32),
-    /// Torque is off.
-    Off,
-}
-
 /// The controller of one arm.
 // In this order all that a sample looks at lies within reach of one base register; the queue is longer than that.
 #[derive(Clone, Debug)]
@@ -115,20 +112,22 @@ enum Shutdown {
 pub struct Controller {
     config: Config,
     body: Body,
-    mode: Mode,
-    cause: Cause,
-    alarm: Option<Finding>,
-    /// Samples until the brake has opened.
-    opening: u32,
-    shutdown: Shutdown,
-    /// Planning steps a sample.
+    state: State,
+    /// Samples that a gap in the feedback may span.
+    max_gap: u32,
+    /// Planning steps in a sample.
     planning_steps: u8,
+    /// What the law had to be cut by since this was last taken.
+    limits: LimitFlags,
+    /// First fault since the last reset.
+    fault: Fault,
+    /// A fault that the peers do not know of yet.
+    alarm: Option<Fault>,
     /// The reference of the last sample, as handed to the law.
     reference: Reference,
     memory: Memory,
     monitor: Monitor,
     excess: Vector4<f32>,
-    limited: u16,
     error: Vector4<f32>,
     replies: Deque<MotionReply, { 2 * CAPACITY }>,
     unanswered: u16,
@@ -144,18 +143,21 @@ impl Controller {
         Self {
             body: Body::new(&config.arm, &config.payload),
             config,
-            mode: Mode::SelfTest,
-            cause: Cause::None,
+            state: State::SelfTest,
+            max_gap: ((MAX_GAP_MS as f32 * 1e-3 / config.period + 0.5) as u32).max(1),
+            planning_steps: clamp(
+                config.period * 1e3 * PLANNING_STEPS_PER_MS + 0.5,
+                1.0,
+                MAX_PLANNING_STEPS,
+            ) as u8,
+            limits: LimitFlags::EMPTY,
+            fault: Fault::NONE,
             alarm: None,
-            opening: 0,
-            shutdown: Shutdown::Off,
             queue: MoveQueue::new(),
-            planning_steps: clamp(config.period * 1e3 + 0.5, 1.0, 10.0) as u8,
             reference: Reference::rest(Vector4::zeros()),
             memory: Memory::new(),
             monitor: Monitor::new(&config.arm, &config.monitor),
             excess: Vector4::zeros(),
-            limited: 0,
             error: Vector4::zeros(),
             replies: Deque::new(),
             unanswered: 0,
@@ -163,17 +165,27 @@ impl Controller {
     }
 
     /// State of the cabinet.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// State of the cabinet as it is reported.
     pub fn mode(&self) -> Mode {
-        self.mode
+        self.state.mode()
     }
 
-    /// Latched cause of the last fault.
+    /// The first fault since the last reset, or [`Fault::NONE`].
+    pub fn fault(&self) -> &Fault {
+        &self.fault
+    }
+
+    /// Cause of the first fault since the last reset.
     pub fn cause(&self) -> Cause {
-        self.cause
+        self.fault.cause
     }
 
-    /// A fault that the peers have not been told of; each is handed out once.
-    pub fn take_alarm(&mut self) -> Option<Finding> {
+    /// A fault that the peers do not know of yet; each is handed out once.
+    pub fn take_alarm(&mut self) -> Option<Fault> {
         self.alarm.take()
     }
 
@@ -197,9 +209,9 @@ impl Controller {
         &self.error
     }
 
-    /// Bit i: axis i was at its torque limit in the last sample.
-    pub fn limited(&self) -> u16 {
-        self.limited
+    /// Every limit that has acted since this was asked for last.
+    pub fn take_limits(&mut self) -> LimitFlags {
+        core::mem::take(&mut self.limits)
     }
 
     /// Moves planned or waiting.
@@ -232,34 +244,6 @@ impl Controller {
         self.replies.pop_front()
     }
 
-    /// Something happened outside: self-test passed, peer found or lost, emergency stop.
-    pub fn event(&mut self, event: Event, cause: Cause) {
-        if event == Event::PeerLost {
-            // Nothing can be brought to rest any more, not even in an emergency stop.
-            self.shutdown = Shutdown::Off;
-        }
-        let Some(next) = mode::transition(self.mode, event) else {
-            return;
-        };
-        if cause != Cause::None {
-            self.latch(cause);
-        }
-        let was_powered = mode::is_powered(self.mode) || self.shutdown != Shutdown::Off;
-        self.enter(next, was_powered);
-    }
-
-    /// Keeps the first cause until a reset, and has it reported.
-    pub fn latch(&mut self, cause: Cause) {
-        if self.cause == Cause::None {
-            self.cause = cause;
-            self.alarm.get_or_insert(Finding {
-                cause,
-                axis: None,
-                value: 0.0,
-            });
-        }
-    }
-
     /// Answers a request without looking at it further.
     pub fn refuse(&mut self, sequence: u8, refusal: Refusal) {
         self.reply(sequence, Outcome::Refused(refusal));
@@ -283,28 +267,20 @@ impl Controller {
         let qd = drive.joint_speed(&readings.speed);
         let measured_torque = drive.joint_torque(&readings.torque);
 
-        if readings.steps > MAX_GAP {
-            self.fail(Finding {
-                cause: Cause::FeedbackLost,
-                axis: None,
-                value: readings.steps as f32,
-            });
+        if readings.steps > 1 {
+            self.bridge(readings.steps);
         }
         self.watch(readings.status, &q, &qd);
-        self.count_brake(readings.steps);
-        if !self.is_holding() {
+        self.wait(readings.steps);
+        if !self.state.is_powered() {
             // No torque: follow the arm, so that switching on starts where it stands.
             self.reference = Reference::rest(q);
             self.queue.clear(&q);
             self.error = Vector4::zeros();
-            self.limited = 0;
             self.excess = Vector4::zeros();
-            return Actions {
-                control: self.control_word(),
-                torque: [0.0; 4],
-            };
+            return self.torque_off();
         }
-        self.reference = self.advance(readings.steps.min(MAX_GAP));
+        self.reference = self.advance(readings.steps.min(self.max_gap));
         let reference = &self.reference;
         let lead = self.config.command_delay + 0.5 * self.config.period;
         self.error = reference.q - q;
@@ -333,29 +309,33 @@ impl Controller {
             model: &model,
             nominal_inertia: &self.body.nominal_inertia,
         };
-        if self.mode == Mode::Enabling || matches!(self.shutdown, Shutdown::Closing(_)) {
+        if self.state.is_braking() {
             // The brake holds: what it carries must not be taken for a disturbance.
             self.memory = Memory::new();
         }
-        let mut torque = self.config.selection.torque(&situation, &mut self.memory);
+        let torque = self.config.selection.torque(&situation, &mut self.memory);
         if !torque.iter().all(|torque| torque.is_finite()) {
             // Nothing finite that comes in leads here; should it happen, the brake is the answer.
             self.memory = Memory::new();
-            torque = Vector4::zeros();
-            self.fail(Finding {
-                cause: Cause::BadValue,
-                axis: None,
-                value: 0.0,
-            });
+            self.fail(Fault::because(Cause::BadValue));
+            return self.torque_off();
         }
         probe.end(Phase::Law);
         let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
         self.excess = limited.excess;
-        self.limited = limited.flags;
+        self.limits = self.limits | limited.flags;
         probe.end(Phase::Limits);
         Actions {
             control: self.control_word(),
             torque: limited.motor_torque.into(),
+        }
+    }
+
+    /// The drives let go; the brake holds the lift.
+    fn torque_off(&self) -> Actions {
+        Actions {
+            control: self.control_word(),
+            torque: [0.0; 4],
         }
     }
 

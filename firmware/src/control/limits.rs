@@ -3,6 +3,7 @@
 //! Limited is not failed: a cut is a flag in the state message and holds the integrals, no more.
 
 use nalgebra::Vector4;
+use protocol::messages::LimitFlags;
 
 use crate::mechanics::arm::ArmModel;
 use crate::mechanics::dynamics::drive::Drive;
@@ -16,9 +17,16 @@ pub struct Limited {
     /// What was cut off, at the joint or else at the motor (N m, lift N): with the sign of the torque, 0 where
     /// nothing was.
     pub excess: Vector4<f32>,
-    /// Bit i: axis i was cut.
-    pub flags: u16,
+    /// Torque of which axes was cut.
+    pub flags: LimitFlags,
 }
+
+const TORQUE: [LimitFlags; 4] = [
+    LimitFlags::TORQUE_SHOULDER,
+    LimitFlags::TORQUE_ELBOW,
+    LimitFlags::TORQUE_LIFT,
+    LimitFlags::TORQUE_WRIST,
+];
 
 /// Cuts joint torques (N m, lift N) to the limits of the joints, then of the motors.
 pub fn cut(arm: &ArmModel, drive: &Drive, torque: &Vector4<f32>) -> Limited {
@@ -30,9 +38,9 @@ pub fn cut(arm: &ArmModel, drive: &Drive, torque: &Vector4<f32>) -> Limited {
     });
     let flags = excess
         .iter()
-        .zip([1u16, 2, 4, 8])
+        .zip(TORQUE)
         .filter(|(cut, _)| **cut != 0.0)
-        .fold(0, |flags, (_, bit)| flags | bit);
+        .fold(LimitFlags::EMPTY, |flags, (_, axis)| flags | axis);
     Limited {
         motor_torque,
         excess,

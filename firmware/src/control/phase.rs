@@ -3,43 +3,31 @@
 //! Marks stand where one phase ends and the next begins, and nowhere else: what measures is the board's. With `()` for
 //! a probe they are no code at all.
 
-/// Part of a call of the node. They follow each other in this order; a call without a sample has the first and the last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phase {
-    /// Frames taken, checked and understood; requests judged.
-    Decode,
-    /// Readings, monitor, mode, and the reference of this sample.
-    Reference,
-    /// Sines, cosines, Jacobians and tool errors.
-    Kinematics,
-    /// Inertia, Coriolis, gravity and friction.
-    Dynamics,
-    /// The control law.
-    Law,
-    /// Torque limits.
-    Limits,
-    /// The command made a frame and handed to the bus.
-    Encode,
-    /// Steps of planning the next move.
-    Planning,
-    /// Watchdogs, replies and what is sent from time to time.
-    Report,
+listed! {
+    /// Part of a call of the node. They follow each other in this order; a call without a sample has the first and the last.
+    pub enum Phase {
+        /// Frames taken, checked and understood; requests judged.
+        Decode,
+        /// Readings, monitor, mode, and the reference of this sample.
+        Reference,
+        /// Sines, cosines, Jacobians and tool errors.
+        Kinematics,
+        /// Inertia, Coriolis, gravity and friction.
+        Dynamics,
+        /// The control law.
+        Law,
+        /// Torque limits.
+        Limits,
+        /// The command made a frame and handed to the bus.
+        Encode,
+        /// Steps of planning the next move.
+        Planning,
+        /// Watchdogs, replies and what is sent from time to time.
+        Report,
+    }
 }
 
 impl Phase {
-    /// Every phase, in order.
-    pub const ALL: [Self; 9] = [
-        Self::Decode,
-        Self::Reference,
-        Self::Kinematics,
-        Self::Dynamics,
-        Self::Law,
-        Self::Limits,
-        Self::Encode,
-        Self::Planning,
-        Self::Report,
-    ];
-
     /// Name, as reports print it.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -1,6 +1,6 @@
 //! What the node makes of faults.
 
-use firmware::control::controller::MAX_GAP;
+use firmware::control::fault::MAX_GAP_MS;
 use firmware::node::PEER_TIMEOUT_US;
 use protocol::frame::CanFrame;
 use protocol::messages::{Cause, Message, Mode, MotionRequest, Outcome};
@@ -9,14 +9,14 @@ use crate::bench::{Bench, PERIOD_US, is_off};
 
 #[test]
 fn gaps_up_to_the_limit_are_ridden_out_and_longer_ones_stop_the_arm() {
-    for lost in 0..=MAX_GAP + 1 {
+    for lost in 0..=MAX_GAP_MS + 1 {
         let mut bench = Bench::enabled();
         for _ in 0..lost {
             bench.next_feedback();
             bench.now += PERIOD_US;
         }
         bench.command();
-        let expected = if lost < MAX_GAP {
+        let expected = if lost < MAX_GAP_MS {
             Mode::Enabled
         } else {
             Mode::FaultReaction

@@ -77,12 +77,12 @@ pub enum OperatorError {
         ours: u32,
     },
     /// The controller stopped.
-    #[error("the controller went to {mode}: {}", cause.describe())]
+    #[error("the controller went to {mode}: {fault}")]
     Stopped {
         /// State it is in.
         mode: Mode,
-        /// Latched cause.
-        cause: protocol::messages::Cause,
+        /// Latched fault.
+        fault: protocol::messages::Fault,
     },
 }
 
@@ -210,10 +210,13 @@ impl Operator {
     /// A controller that has stopped by itself ends the run.
     fn watch(&self) -> Result<(), OperatorError> {
         match self.state {
-            Some(State { mode, cause, .. })
-                if matches!(mode, Mode::FaultReaction | Mode::Fault | Mode::EStop) =>
+            Some(state)
+                if matches!(state.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop) =>
             {
-                Err(OperatorError::Stopped { mode, cause })
+                Err(OperatorError::Stopped {
+                    mode: state.mode,
+                    fault: state.fault(),
+                })
             }
             _ => Ok(()),
         }

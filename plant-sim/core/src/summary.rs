@@ -4,7 +4,7 @@ use std::io;
 
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{Message, Node};
+use protocol::messages::{FaultAxis, Message, Node};
 use protocol::schema::Content;
 use protocol::table;
 use serde::Serialize;
@@ -84,12 +84,34 @@ pub struct Fault {
     pub code: String,
     /// What it means.
     pub description: &'static str,
+    /// Axis, if one is concerned.
+    pub axis: Option<&'static str>,
+    /// What was found; 0 if that is no number.
+    pub value: f32,
+    /// What is allowed; 0 if that is no number.
+    pub limit: f32,
+    /// Unit of value and limit.
+    pub unit: &'static str,
+    /// All of it as a person reads it.
+    pub text: String,
+}
+
+impl Fault {
+    fn describe(&mut self, fault: &protocol::messages::Fault) {
+        self.axis = (fault.axis != FaultAxis::None).then_some(fault.axis.name());
+        self.value = fault.value;
+        self.limit = fault.limit;
+        self.unit = fault.unit().symbol();
+        self.text = fault.to_string();
+    }
 }
 
 /// The observer that makes a [`Summary`].
 pub struct Collector {
     metrics: Metrics,
     faults: Vec<Fault>,
+    /// An emergency has come, and no state since.
+    awaits_state: bool,
     target: [f64; 3],
 }
 
@@ -99,6 +121,7 @@ impl Collector {
         Self {
             metrics: Metrics::new(&config.actual),
             faults: Vec::new(),
+            awaits_state: false,
             target: config.cycle_target(),
         }
     }
@@ -148,20 +171,41 @@ impl Collector {
 
 impl Observer for Collector {
     fn frame(&mut self, time: u64, frame: &CanFrame) -> io::Result<()> {
-        if table::of_frame(frame).map(|info| info.content)
-            != Some(Content::Emergency(Node::Controller))
-        {
-            return Ok(());
+        match table::of_frame(frame).map(|info| info.content) {
+            Some(Content::Emergency(Node::Controller)) => {}
+            Some(Content::State) if self.awaits_state => {}
+            _ => return Ok(()),
         }
-        if let Ok(received) = codec::decode(frame)
-            && let Message::Emergency(_, emergency) = received.message
-        {
-            self.faults.push(Fault {
-                time_s: time as f64 * 1e-9,
-                cause: emergency.cause.name(),
-                code: format!("{:04x}", emergency.code),
-                description: emergency.cause.describe(),
-            });
+        let Ok(received) = codec::decode(frame) else {
+            return Ok(());
+        };
+        match received.message {
+            Message::Emergency(_, emergency) => {
+                let mut fault = Fault {
+                    time_s: time as f64 * 1e-9,
+                    cause: emergency.cause.name(),
+                    code: format!("{:04x}", emergency.code),
+                    description: emergency.cause.describe(),
+                    axis: None,
+                    value: 0.0,
+                    limit: 0.0,
+                    unit: "",
+                    text: String::new(),
+                };
+                fault.describe(&emergency.fault());
+                self.faults.push(fault);
+                self.awaits_state = true;
+            }
+            // What had no room in the emergency follows at once.
+            Message::State(state) => {
+                self.awaits_state = false;
+                if let Some(last) = self.faults.last_mut()
+                    && last.cause == state.cause.name()
+                {
+                    last.describe(&state.fault());
+                }
+            }
+            _ => {}
         }
         Ok(())
     }

@@ -348,9 +348,9 @@ fn report(results: &Results, out: &Path) -> String {
             for fault in faults {
                 line!(
                     text,
-                    "  fault             {:.3} s: {} ({}): {}",
+                    "  fault             {:.3} s: {} (code {}: {})",
                     fault.time_s,
-                    fault.cause,
+                    fault.text,
                     fault.code,
                     fault.description
                 );

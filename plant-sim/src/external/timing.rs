@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use firmware::control::controller::MAX_GAP;
+use firmware::control::fault::MAX_GAP_MS;
 use firmware::node::PEER_TIMEOUT_US;
 
 use sim::drives::HOLD_SAMPLES;
@@ -152,7 +152,10 @@ impl Timing {
         [
             ("command before the next sample", self.period),
             ("drives hold the last torque", self.period * HOLD_SAMPLES),
-            ("controller bridges missing samples", self.period * MAX_GAP),
+            (
+                "controller bridges missing samples",
+                Duration::from_millis(u64::from(MAX_GAP_MS)),
+            ),
             (
                 "controller takes drives for silent",
                 Duration::from_micros(PEER_TIMEOUT_US),

@@ -150,11 +150,9 @@ impl Shell {
         if controller.mode() != self.mode {
             self.mode = controller.mode();
             match self.mode {
-                Mode::FaultReaction | Mode::Fault | Mode::EStop => eprintln!(
-                    "controller: {}: {}",
-                    self.mode,
-                    controller.cause().describe()
-                ),
+                Mode::FaultReaction | Mode::Fault | Mode::EStop => {
+                    eprintln!("controller: {}: {}", self.mode, controller.fault());
+                }
                 mode => eprintln!("controller: {mode}"),
             }
         }

@@ -1,19 +1,14 @@
 //! Where the moves are: planned on, followed, stopped, taken back.
 
-use nalgebra::Vector4;
-use protocol::messages::{Cause, Mode, Outcome, Refusal, RefusalReason};
+use protocol::messages::{Outcome, Refusal, RefusalReason};
 
-use super::{Controller, Shutdown};
-use crate::control::mode::Event;
+use super::Controller;
+use crate::control::states::{Event, State};
 use crate::trajectory::Reference;
 use crate::trajectory::capacity::Capacity;
 use crate::trajectory::queue::Progress;
 
 impl Controller {
-    pub(super) fn is_stopping(&self) -> bool {
-        self.mode == Mode::QuickStop || self.shutdown == Shutdown::Stopping
-    }
-
     /// Refuses what waits to be planned; planned moves go when the arm has come to rest.
     pub(super) fn withdraw(&mut self) {
         while let Some(sequence) = self.queue.withdraw() {
@@ -28,7 +23,7 @@ impl Controller {
     /// period, at least one. Off the way from measurement to command, which it would only make
     /// late. Returns whether there was anything to plan.
     pub fn plan(&mut self) -> bool {
-        if !self.is_holding() || !self.queue.has_to_plan() {
+        if !self.state.is_powered() || !self.queue.has_to_plan() {
             return false;
         }
         let capacity = Capacity {
@@ -50,13 +45,13 @@ impl Controller {
 
     /// The reference at this sample.
     pub(super) fn advance(&mut self, steps: u32) -> Reference {
-        if self.mode == Mode::Enabled {
+        if self.state == State::Enabled {
             if !self.queue.is_ready() {
                 return Reference::rest(self.reference.q);
             }
-            self.event(Event::Start, Cause::None);
+            self.event(Event::Start);
         }
-        let stopping = self.is_stopping();
+        let stopping = self.state.is_stopping();
         let (reference, progress) = self.queue.advance(
             &self.config.arm,
             steps,
@@ -66,18 +61,14 @@ impl Controller {
         );
         match progress {
             Progress::UnderWay => {}
-            Progress::Arrived if stopping => self.come_to_rest(&reference.q),
-            Progress::Arrived => self.event(Event::Arrived, Cause::None),
+            Progress::Arrived if stopping => {
+                self.queue.clear(&reference.q);
+                self.event(Event::AtRest);
+            }
+            Progress::Arrived => {
+                self.event(Event::Arrived);
+            }
         }
         reference
-    }
-
-    pub(super) fn come_to_rest(&mut self, q: &Vector4<f32>) {
-        self.queue.clear(q);
-        if self.mode == Mode::QuickStop {
-            self.event(Event::AtRest, Cause::None);
-        } else {
-            self.shutdown = Shutdown::Closing(self.brake_samples());
-        }
     }
 }

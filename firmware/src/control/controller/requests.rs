@@ -1,12 +1,12 @@
 //! What an operator may ask for in which state.
 
 use nalgebra::Vector4;
-use protocol::messages::{Cause, Mode, MotionRequest, Refusal, RefusalReason};
+use protocol::messages::{Compensation, MotionRequest, Refusal, RefusalReason};
 
-use super::{Controller, Shutdown};
+use super::Controller;
 use crate::control::laws::{Gains, Memory};
-use crate::control::mode::{self, Event};
-use crate::mechanics::arm::Payload;
+use crate::control::states::{Event, State};
+use crate::mechanics::arm::{ModelError, Payload, Rule};
 use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Pose;
 use crate::trajectory::request::{Request, Target};
@@ -23,27 +23,25 @@ impl Controller {
         sequence: u8,
         request: &MotionRequest,
     ) -> Result<Answer, Refusal> {
-        let idle = matches!(self.mode, Mode::Ready | Mode::PreOperational)
-            || (self.mode == Mode::Enabled && self.queue.is_empty());
+        let idle = matches!(self.state, State::Ready | State::PreOperational)
+            || (self.state == State::Enabled && self.queue.is_empty());
         let answer = match request {
             MotionRequest::Enable => return self.operate(Event::Enable),
             MotionRequest::Disable if !self.queue.is_empty() => {
                 return Err(Refusal::because(RefusalReason::Moving));
             }
             MotionRequest::Disable => return self.operate(Event::Disable),
-            MotionRequest::FaultReset => {
-                if self.shutdown != Shutdown::Off {
-                    return Err(Refusal::because(RefusalReason::Moving));
-                }
-                return self.operate(Event::Reset);
+            MotionRequest::FaultReset if self.state.is_halting() => {
+                return Err(Refusal::because(RefusalReason::Moving));
             }
+            MotionRequest::FaultReset => return self.operate(Event::Reset),
             MotionRequest::Stop => {
                 self.withdraw();
-                if self.mode == Mode::Enabled {
+                if self.state == State::Enabled {
                     // Planned, not begun: there is nothing to brake.
                     self.queue.clear(&self.reference.q);
                 }
-                self.event(Event::Stop, Cause::None);
+                self.event(Event::Stop);
                 Answer::Now
             }
             MotionRequest::MoveJoint { target, speed } => {
@@ -67,18 +65,24 @@ impl Controller {
             }
             _ if !idle => return Err(Refusal::because(RefusalReason::Moving)),
             MotionRequest::SetPayload { mass, com, inertia } => {
-                let limit = self.config.arm.payload_max;
-                if *mass > limit {
-                    return Err(Refusal::value(RefusalReason::PayloadTooHeavy, *mass, limit));
-                }
-                self.config.payload = Payload {
+                let payload = Payload {
                     mass: *mass,
                     com: (*com).into(),
                     inertia: (*inertia).into(),
                 };
+                self.config
+                    .arm
+                    .validate_payload(&payload)
+                    .map_err(payload_refusal)?;
+                self.config.payload = payload;
                 self.body = Body::new(&self.config.arm, &self.config.payload);
                 self.memory = Memory::new();
                 Answer::Now
+            }
+            MotionRequest::SelectLaw { law, compensation }
+                if *compensation != Compensation::None && !law.takes_compensation() =>
+            {
+                return Err(Refusal::because(RefusalReason::NoCompensation));
             }
             MotionRequest::SelectLaw { law, compensation } => {
                 self.config.selection.law = *law;
@@ -106,17 +110,17 @@ impl Controller {
     }
 
     fn operate(&mut self, event: Event) -> Result<Answer, Refusal> {
-        if mode::transition(self.mode, event).is_none() {
-            return Err(Refusal::because(RefusalReason::WrongState));
+        if self.event(event) {
+            Ok(Answer::Now)
+        } else {
+            Err(Refusal::because(RefusalReason::WrongState))
         }
-        self.event(event, Cause::None);
-        Ok(Answer::Now)
     }
 
     fn enqueue(&mut self, sequence: u8, target: Target, speed: f32) -> Result<Answer, Refusal> {
-        match self.mode {
-            Mode::Enabled | Mode::Moving => {}
-            Mode::Ready | Mode::Enabling => {
+        match self.state {
+            State::Enabled | State::Moving => {}
+            State::Ready | State::Enabling(_) => {
                 return Err(Refusal::because(RefusalReason::NotEnabled));
             }
             _ => return Err(Refusal::because(RefusalReason::WrongState)),
@@ -129,6 +133,16 @@ impl Controller {
         self.queue.push(request)?;
         Ok(Answer::WhenPlanned)
     }
+}
+
+/// What an operator reads of a payload that breaks a rule.
+fn payload_refusal(error: ModelError) -> Refusal {
+    let (reason, limit) = match error.rule {
+        Rule::AtMost(limit) => (RefusalReason::PayloadTooHeavy, limit),
+        _ if error.value.is_finite() => (RefusalReason::OutOfRange, 0.0),
+        _ => return Refusal::because(RefusalReason::NotFinite),
+    };
+    Refusal::value(reason, error.value, limit)
 }
 
 fn pose(target: &[f32; 4]) -> Pose {

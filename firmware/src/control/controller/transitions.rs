@@ -1,0 +1,103 @@
+//! Entry actions of the states, and what leads from one to the next.
+
+use nalgebra::Vector4;
+use protocol::messages::{Cause, ControlWord, DriveStatus, Fault, LimitFlags};
+
+use super::Controller;
+use crate::control::fault::{self, MAX_GAP_MS};
+use crate::control::laws::Memory;
+use crate::control::monitor::Monitor;
+use crate::control::states::{Event, Halt, State};
+
+impl Controller {
+    /// Takes the transition that the state has for `event`; returns whether there is one.
+    pub fn event(&mut self, event: Event) -> bool {
+        let brake = (self.config.brake_delay / self.config.period) as u32 + 1;
+        let Some(next) = self.state.after(event, brake) else {
+            return false;
+        };
+        self.enter(next);
+        true
+    }
+
+    /// Something is wrong: does what the table of faults has for it. The first fault is kept until a reset; every one that
+    /// changes the state is reported.
+    // Out of line: rarely reached in a sample.
+    #[inline(never)]
+    pub fn fail(&mut self, fault: Fault) {
+        let before = self.fault;
+        let first = before.cause == Cause::None;
+        if first {
+            // Ahead of the transition, which may lead where no fault is latched.
+            self.fault = fault;
+        }
+        let changed = fault::event(fault.cause, self.state).is_some_and(|event| self.event(event));
+        if changed || (first && fault.cause == Cause::SelfTest) {
+            self.alarm.get_or_insert(fault);
+        } else {
+            self.fault = before;
+        }
+    }
+
+    fn enter(&mut self, next: State) {
+        match next {
+            State::Enabling(_) => {
+                self.memory = Memory::new();
+                self.monitor.reset();
+            }
+            State::Fault(halt) | State::EStop(halt) => {
+                self.withdraw();
+                // What is wrong has to show again before it leads further.
+                self.monitor.reset();
+                if halt == Halt::Off {
+                    self.queue.clear(&self.reference.q);
+                }
+            }
+            State::PreOperational => self.fault = Fault::NONE,
+            _ => {}
+        }
+        self.state = next;
+    }
+
+    /// A gap in the feedback: bridged if it is short.
+    pub(super) fn bridge(&mut self, steps: u32) {
+        if steps > self.max_gap {
+            let gap = steps as f32 * self.config.period * 1e3;
+            let fault = Fault::value(Cause::FeedbackLost, gap, MAX_GAP_MS as f32);
+            self.fail(fault);
+        } else if self.state.is_powered() {
+            self.limits = self.limits | LimitFlags::PREDICTED;
+        }
+    }
+
+    /// Watches the arm for as long as torque moves or holds it, a stop for a fault included.
+    pub(super) fn watch(&mut self, status: DriveStatus, q: &Vector4<f32>, qd: &Vector4<f32>) {
+        if !self.state.is_powered() {
+            return;
+        }
+        if let Some(fault) = Monitor::status(status) {
+            self.fail(fault);
+        }
+        let error = self.reference.q - q;
+        // The reference of the last sample: at most one sample of motion older than `q`.
+        let moved = self.reference.qd * self.config.period;
+        if let Some(fault) = self.monitor.check(q, qd, &(error + moved)) {
+            self.fail(fault);
+        }
+    }
+
+    /// Time passes for the brake.
+    pub(super) fn wait(&mut self, steps: u32) {
+        let (state, event) = self.state.wait(steps);
+        self.state = state;
+        if let Some(event) = event {
+            self.event(event);
+        }
+    }
+
+    /// What drives and pins are to do now: unlike the command sent last, it also follows what
+    /// happens between two samples.
+    pub fn control_word(&self) -> ControlWord {
+        self.state.control_word()
+    }
+}

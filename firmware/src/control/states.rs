@@ -1,0 +1,295 @@
+//! States of the drive cabinet and every way from one to another.
+//!
+//! [`TRANSITIONS`] is the whole machine; `docs/safety.md` has its drawing, made from the table by the test `states`. A state
+//! carries what it needs and says what the drives are to do in it ([`State::control_word`]). Entry actions are the
+//! controller's.
+
+use protocol::messages::{ControlWord, Mode};
+
+/// State of the cabinet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Nothing is known to work yet; left only by passing.
+    SelfTest,
+    /// Sound, and waits for the drives.
+    PreOperational,
+    /// Would follow an enable.
+    Ready,
+    /// Torque holds the arm while the brake opens; samples left.
+    Enabling(u32),
+    /// Under torque, at rest.
+    Enabled,
+    /// Under torque, on a move.
+    Moving,
+    /// The operator has asked for a stop on the path.
+    QuickStop,
+    /// Torque holds the arm while the brake closes; samples left.
+    Disabling(u32),
+    /// A fault is latched.
+    Fault(Halt),
+    /// An emergency stop is latched.
+    EStop(Halt),
+}
+
+/// How far a latched stop has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Halt {
+    /// Coming to rest on the path.
+    Stopping,
+    /// The brake closes. Until it has, torque carries the lift and goes on stopping the other axes; samples left.
+    Closing(u32),
+    /// Torque is off.
+    Off,
+}
+
+listed! {
+    /// What can change the state.
+    #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+    pub enum Event {
+        /// Known answers and the model are right.
+        SelfTestPassed,
+        /// The drives speak the same protocol and their encoders are valid.
+        PeerReady,
+        /// Operator: switch on.
+        Enable,
+        /// Operator: switch off.
+        Disable,
+        /// The brake has had time to open.
+        BrakeOpen,
+        /// The brake has had time to close: torque may go.
+        BrakeClosed,
+        /// A planned move is waiting.
+        Start,
+        /// The last move has ended.
+        Arrived,
+        /// Operator: stop on the path.
+        Stop,
+        /// The stop has come to rest.
+        AtRest,
+        /// A fault: stop on the path, then switch off.
+        FaultStop,
+        /// A fault: the brake first; torque until it has closed.
+        FaultBrake,
+        /// A fault: brake and torque off at once.
+        FaultOff,
+        /// Emergency stop: stop on the path, then switch off.
+        EmergencyStop,
+        /// Operator: fault reset, or end of the emergency stop.
+        Reset,
+    }
+}
+
+/// Every transition: from, on, to. What is not here changes nothing. The samples left of a state are 0 here; who enters it
+/// puts in the time that the brake takes.
+pub const TRANSITIONS: [(State, Event, State); 49] = {
+    use Event::{
+        Arrived, AtRest, BrakeClosed, BrakeOpen, Disable, EmergencyStop, Enable, FaultBrake,
+        FaultOff, FaultStop, PeerReady, Reset, SelfTestPassed, Start, Stop,
+    };
+    use Halt::{Closing, Off, Stopping};
+    use State::{
+        Disabling, EStop, Enabled, Enabling, Fault, Moving, PreOperational, QuickStop, Ready,
+        SelfTest,
+    };
+    [
+        // Nothing else leaves the self-test: an emergency stop with its reset would lead past it.
+        (SelfTest, SelfTestPassed, PreOperational),
+        (PreOperational, PeerReady, Ready),
+        (PreOperational, EmergencyStop, EStop(Off)),
+        (Ready, Enable, Enabling(0)),
+        (Ready, FaultOff, PreOperational),
+        (Ready, EmergencyStop, EStop(Off)),
+        // The arm is at rest and the brake not open yet: there is nothing to stop.
+        (Enabling(0), BrakeOpen, Enabled),
+        (Enabling(0), Disable, Disabling(0)),
+        (Enabling(0), FaultStop, Fault(Closing(0))),
+        (Enabling(0), FaultBrake, Fault(Closing(0))),
+        (Enabling(0), FaultOff, Fault(Off)),
+        (Enabling(0), EmergencyStop, EStop(Closing(0))),
+        (Enabled, Start, Moving),
+        (Enabled, Disable, Disabling(0)),
+        (Enabled, FaultStop, Fault(Stopping)),
+        (Enabled, FaultBrake, Fault(Closing(0))),
+        (Enabled, FaultOff, Fault(Off)),
+        (Enabled, EmergencyStop, EStop(Stopping)),
+        (Moving, Arrived, Enabled),
+        (Moving, Stop, QuickStop),
+        (Moving, FaultStop, Fault(Stopping)),
+        (Moving, FaultBrake, Fault(Closing(0))),
+        (Moving, FaultOff, Fault(Off)),
+        (Moving, EmergencyStop, EStop(Stopping)),
+        (QuickStop, AtRest, Enabled),
+        (QuickStop, FaultStop, Fault(Stopping)),
+        (QuickStop, FaultBrake, Fault(Closing(0))),
+        (QuickStop, FaultOff, Fault(Off)),
+        (QuickStop, EmergencyStop, EStop(Stopping)),
+        (Disabling(0), BrakeClosed, Ready),
+        (Disabling(0), FaultStop, Fault(Closing(0))),
+        (Disabling(0), FaultBrake, Fault(Closing(0))),
+        (Disabling(0), FaultOff, Fault(Off)),
+        (Disabling(0), EmergencyStop, EStop(Closing(0))),
+        (Fault(Stopping), AtRest, Fault(Closing(0))),
+        (Fault(Stopping), FaultBrake, Fault(Closing(0))),
+        (Fault(Stopping), FaultOff, Fault(Off)),
+        (Fault(Stopping), EmergencyStop, EStop(Stopping)),
+        (Fault(Closing(0)), BrakeClosed, Fault(Off)),
+        (Fault(Closing(0)), FaultOff, Fault(Off)),
+        (Fault(Closing(0)), EmergencyStop, EStop(Closing(0))),
+        (Fault(Off), EmergencyStop, EStop(Off)),
+        (Fault(Off), Reset, PreOperational),
+        (EStop(Stopping), AtRest, EStop(Closing(0))),
+        (EStop(Stopping), FaultBrake, EStop(Closing(0))),
+        (EStop(Stopping), FaultOff, EStop(Off)),
+        (EStop(Closing(0)), BrakeClosed, EStop(Off)),
+        (EStop(Closing(0)), FaultOff, EStop(Off)),
+        (EStop(Off), Reset, PreOperational),
+    ]
+};
+
+/// Number of states, whatever they carry.
+const STATES: usize = 14;
+/// No row of [`TRANSITIONS`].
+const NO_ROW: u8 = u8::MAX;
+
+/// Row of [`TRANSITIONS`] by state and event: found at once, since samples ask.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
+static ROWS: [[u8; Event::ALL.len()]; STATES] = {
+    let mut rows = [[NO_ROW; Event::ALL.len()]; STATES];
+    let mut row = 0;
+    while row < TRANSITIONS.len() {
+        let (from, event, _) = TRANSITIONS[row];
+        let cell = &mut rows[from.index()][event as usize];
+        assert!(*cell == NO_ROW, "one event leads to two states");
+        *cell = row as u8;
+        row += 1;
+    }
+    rows
+};
+
+impl State {
+    /// State after `event`, or `None` if it means nothing in this state; `brake` is the time, in samples, that the brake
+    /// takes.
+    pub fn after(self, event: Event, brake: u32) -> Option<Self> {
+        let row = *ROWS.get(self.index())?.get(event as usize)?;
+        let (_, _, next) = TRANSITIONS.get(usize::from(row))?;
+        Some(next.with_samples_left(brake))
+    }
+
+    const fn index(self) -> usize {
+        match self {
+            Self::SelfTest => 0,
+            Self::PreOperational => 1,
+            Self::Ready => 2,
+            Self::Enabling(_) => 3,
+            Self::Enabled => 4,
+            Self::Moving => 5,
+            Self::QuickStop => 6,
+            Self::Disabling(_) => 7,
+            Self::Fault(Halt::Stopping) => 8,
+            Self::Fault(Halt::Closing(_)) => 9,
+            Self::Fault(Halt::Off) => 10,
+            Self::EStop(Halt::Stopping) => 11,
+            Self::EStop(Halt::Closing(_)) => 12,
+            Self::EStop(Halt::Off) => 13,
+        }
+    }
+
+    const fn with_samples_left(self, samples: u32) -> Self {
+        match self {
+            Self::Enabling(_) => Self::Enabling(samples),
+            Self::Disabling(_) => Self::Disabling(samples),
+            Self::Fault(Halt::Closing(_)) => Self::Fault(Halt::Closing(samples)),
+            Self::EStop(Halt::Closing(_)) => Self::EStop(Halt::Closing(samples)),
+            other => other,
+        }
+    }
+
+    /// The state `steps` samples later, and the event that this brings about.
+    pub(super) fn wait(self, steps: u32) -> (Self, Option<Event>) {
+        let (left, event) = match self {
+            Self::Enabling(left) => (left, Event::BrakeOpen),
+            Self::Disabling(left)
+            | Self::Fault(Halt::Closing(left))
+            | Self::EStop(Halt::Closing(left)) => (left, Event::BrakeClosed),
+            _ => return (self, None),
+        };
+        let left = left.saturating_sub(steps);
+        (self.with_samples_left(left), (left == 0).then_some(event))
+    }
+
+    /// What goes to the drives in this state.
+    pub const fn control_word(self) -> ControlWord {
+        let (torque, brake, stop, estop) = (
+            ControlWord::TORQUE_ENABLE,
+            ControlWord::BRAKE_RELEASE,
+            ControlWord::QUICK_STOP,
+            ControlWord::ESTOP,
+        );
+        match self {
+            Self::SelfTest | Self::PreOperational | Self::Ready | Self::Fault(Halt::Off) => {
+                ControlWord::EMPTY
+            }
+            Self::Enabling(_) | Self::Enabled | Self::Moving => torque.with(brake, true),
+            Self::QuickStop | Self::Fault(Halt::Stopping) => {
+                torque.with(brake, true).with(stop, true)
+            }
+            Self::Disabling(_) | Self::Fault(Halt::Closing(_)) => torque,
+            Self::EStop(Halt::Stopping) => {
+                torque.with(brake, true).with(stop, true).with(estop, true)
+            }
+            Self::EStop(Halt::Closing(_)) => torque.with(estop, true),
+            Self::EStop(Halt::Off) => estop,
+        }
+    }
+
+    /// The state as it is reported.
+    pub const fn mode(self) -> Mode {
+        match self {
+            Self::SelfTest => Mode::SelfTest,
+            Self::PreOperational => Mode::PreOperational,
+            Self::Ready => Mode::Ready,
+            Self::Enabling(_) => Mode::Enabling,
+            Self::Enabled => Mode::Enabled,
+            Self::Moving => Mode::Moving,
+            Self::QuickStop => Mode::QuickStop,
+            Self::Disabling(_) => Mode::Disabling,
+            Self::Fault(Halt::Off) => Mode::Fault,
+            Self::Fault(_) => Mode::FaultReaction,
+            Self::EStop(_) => Mode::EStop,
+        }
+    }
+
+    /// How far a latched stop has come; `None` without one.
+    pub const fn halt(self) -> Option<Halt> {
+        match self {
+            Self::Fault(halt) | Self::EStop(halt) => Some(halt),
+            _ => None,
+        }
+    }
+
+    /// Whether a latched stop is not over yet.
+    pub(super) const fn is_halting(self) -> bool {
+        matches!(self.halt(), Some(Halt::Stopping | Halt::Closing(_)))
+    }
+
+    /// Whether torque holds or moves the arm.
+    pub const fn is_powered(self) -> bool {
+        self.control_word().contains(ControlWord::TORQUE_ENABLE)
+    }
+
+    /// Whether the arm is to come to rest.
+    pub(super) const fn is_stopping(self) -> bool {
+        self.is_halting() || matches!(self, Self::QuickStop)
+    }
+
+    /// Whether the brake may hold the lift, beside the torque.
+    pub(super) const fn is_braking(self) -> bool {
+        matches!(
+            self,
+            Self::Enabling(_)
+                | Self::Disabling(_)
+                | Self::Fault(Halt::Closing(_))
+                | Self::EStop(Halt::Closing(_))
+        )
+    }
+}
