@@ -35,7 +35,7 @@ impl Bus for Wire {
     }
 }
 
-/// A node, and an arm that stands still whatever it is told.
+/// A node, and an arm that stands still whatever it is told; unless it `follows`, and is where the node wants it.
 pub struct Bench {
     pub node: Node,
     pub wire: Wire,
@@ -45,36 +45,75 @@ pub struct Bench {
     pub motion_counter: u8,
     pub sequence: u8,
     pub position: [i32; 4],
+    pub velocity: [f32; 4],
+    pub status: DriveStatus,
+    pub follows: bool,
+    period_us: u64,
+    drive: Drive,
 }
 
 impl Bench {
     pub fn new() -> Self {
-        let drive = Drive::new(&IRB_930.drive);
-        let q = Vector4::new(0.2, 1.5, 0.15, 0.3);
-        Self {
-            node: Node::new(Config::new(IRB_930, 1e-3), ResetReason::Watchdog),
+        Self::with(Config::new(IRB_930, 1e-3))
+    }
+
+    pub fn with(config: Config) -> Self {
+        let mut bench = Self {
+            node: Node::new(config, ResetReason::Watchdog),
             wire: Wire::default(),
             now: 0,
             sample: 0,
             feedback_counter: 0,
             motion_counter: 0,
             sequence: 0,
-            position: drive.counts_of_motor_angle(&drive.motor_angle(&q)),
-        }
+            position: [0; 4],
+            velocity: [0.0; 4],
+            status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
+            follows: false,
+            period_us: (config.period * 1e6).round() as u64,
+            drive: Drive::new(&IRB_930.drive),
+        };
+        bench.put(&Vector4::new(0.2, 1.5, 0.15, 0.3));
+        bench
+    }
+
+    /// Puts the arm there.
+    pub fn put(&mut self, q: &Vector4<f32>) {
+        let angle = self.drive.motor_angle(q);
+        self.position = self.drive.counts_of_motor_angle(&angle);
     }
 
     /// A bench whose axes are under torque.
     pub fn enabled() -> Self {
         let mut bench = Self::new();
-        bench.hello(table::HASH);
-        bench.run(2);
-        assert_eq!(bench.request(MotionRequest::Stop), Some(Outcome::Accepted));
-        assert_eq!(
-            bench.request(MotionRequest::Enable),
-            Some(Outcome::Accepted)
-        );
-        bench.run(100);
+        bench.enable();
         assert_eq!(bench.mode(), Mode::Enabled);
+        bench
+    }
+
+    pub fn enable(&mut self) {
+        self.hello(table::HASH);
+        self.run(2);
+        assert_eq!(self.request(MotionRequest::Stop), Some(Outcome::Accepted));
+        assert_eq!(self.request(MotionRequest::Enable), Some(Outcome::Accepted));
+        self.run(100);
+    }
+
+    /// A bench whose arm is in the middle of a fast move.
+    pub fn moving() -> Self {
+        let mut bench = Self::enabled();
+        bench.follows = true;
+        let target = [-1.0, 0.5, 0.05, -2.0];
+        let frame = bench.motion(MotionRequest::MoveJoint { target, speed: 1.0 });
+        bench.wire.to_node.push_back(frame);
+        let fast = |bench: &Self| bench.node.controller().reference().qd.x < -3.0;
+        for _ in 0..500 {
+            if fast(&bench) {
+                break;
+            }
+            bench.step();
+        }
+        assert!(fast(&bench) && bench.mode() == Mode::Moving);
         bench
     }
 
@@ -83,11 +122,16 @@ impl Bench {
     }
 
     pub fn next_feedback(&mut self) -> CanFrame {
+        if self.follows {
+            let reference = *self.node.controller().reference();
+            self.put(&reference.q);
+            self.velocity = self.drive.motor_angle(&reference.qd).into();
+        }
         let feedback = Feedback {
             sample: self.sample,
-            status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
+            status: self.status,
             position: self.position,
-            velocity: [0.0; 4],
+            velocity: self.velocity,
             torque: [0; 4],
         };
         let frame = encode(&Message::Feedback(feedback), self.feedback_counter).unwrap();
@@ -107,7 +151,7 @@ impl Bench {
 
     /// One sample with what has been put on the wire; returns what the node sent.
     pub fn step(&mut self) -> Vec<Message> {
-        self.now += PERIOD_US;
+        self.now += self.period_us;
         let frame = self.next_feedback();
         self.wire.to_node.push_back(frame);
         self.poll()
@@ -129,6 +173,23 @@ impl Bench {
         assert_eq!(commands.len(), 1, "one command a feedback: {sent:?}");
         assert_eq!(commands[0].sample, self.sample - 1, "the sample is echoed");
         commands[0]
+    }
+
+    /// A sample that is lost on its way.
+    pub fn lose(&mut self) {
+        self.next_feedback();
+        self.now += self.period_us;
+    }
+
+    /// Control words of the next samples.
+    pub fn words(&mut self, samples: usize) -> Vec<ControlWord> {
+        self.run(samples)
+            .iter()
+            .filter_map(|message| match message {
+                Message::Command(command) => Some(command.control),
+                _ => None,
+            })
+            .collect()
     }
 
     pub fn hello(&mut self, schema: u32) {

@@ -1,19 +1,43 @@
 //! What the node makes of faults.
 
-use firmware::control::fault::MAX_GAP_MS;
+use firmware::control::controller::Config;
+use firmware::control::fault::{MAX_GAP_MS, REACTIONS};
+use firmware::mechanics::arm::IRB_930;
 use firmware::node::PEER_TIMEOUT_US;
+use nalgebra::Vector4;
+use protocol::e2e::Profile;
 use protocol::frame::CanFrame;
-use protocol::messages::{Cause, Message, Mode, MotionRequest, Outcome};
+use protocol::messages::{
+    Cause, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode, MotionRequest, Outcome,
+    State,
+};
 
-use crate::bench::{Bench, PERIOD_US, is_off};
+use crate::bench::{Bench, estop, is_off};
+
+fn emergencies(sent: &[Message]) -> Vec<Emergency> {
+    sent.iter()
+        .filter_map(|message| match message {
+            Message::Emergency(_, emergency) => Some(*emergency),
+            _ => None,
+        })
+        .collect()
+}
+
+pub fn states(sent: &[Message]) -> Vec<State> {
+    sent.iter()
+        .filter_map(|message| match message {
+            Message::State(state) => Some(*state),
+            _ => None,
+        })
+        .collect()
+}
 
 #[test]
 fn gaps_up_to_the_limit_are_ridden_out_and_longer_ones_stop_the_arm() {
     for lost in 0..=MAX_GAP_MS + 1 {
         let mut bench = Bench::enabled();
         for _ in 0..lost {
-            bench.next_feedback();
-            bench.now += PERIOD_US;
+            bench.lose();
         }
         bench.command();
         let expected = if lost < MAX_GAP_MS {
@@ -85,4 +109,174 @@ fn three_bad_feedback_frames_in_a_row_stop_the_arm() {
     }
     assert_eq!(bench.node.received().crc, 3);
     assert_eq!(bench.node.controller().cause(), Cause::Corrupted);
+}
+
+/// A frame whose checksum is right and whose shoulder speed is no number.
+fn not_a_number(good: &CanFrame) -> CanFrame {
+    let mut bytes = good.data().to_vec();
+    let counter = bytes[bytes.len() - 3];
+    bytes[21..25].copy_from_slice(&f32::NAN.to_le_bytes());
+    Profile::Fd.protect(0x1C0, counter, &mut bytes);
+    CanFrame::fd(good.id(), &bytes, true).unwrap()
+}
+
+/// A node that has just met with this, and what it has sent; `None` for a cause that is reserved.
+fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
+    let mut bench = match cause {
+        Cause::SelfTest => {
+            let mut arm = IRB_930;
+            arm.payload_max = -1.0;
+            Bench::with(Config::new(arm, 1e-3))
+        }
+        _ => Bench::enabled(),
+    };
+    let repeat = |bench: &mut Bench, frame: CanFrame| {
+        bench.wire.to_node.extend([frame; 3]);
+        bench.poll()
+    };
+    let sent = match cause {
+        Cause::SelfTest => bench.poll(),
+        Cause::FeedbackLost => {
+            (0..6).for_each(|_| bench.lose());
+            bench.step()
+        }
+        Cause::PeerSilent => {
+            bench.now += PEER_TIMEOUT_US + 1;
+            bench.poll()
+        }
+        Cause::Reordered => {
+            let frame = bench.next_feedback();
+            bench.wire.to_node.push_back(frame);
+            repeat(&mut bench, frame)
+        }
+        Cause::Corrupted => {
+            let good = bench.next_feedback();
+            let short = CanFrame::fd(good.id(), &good.data()[..32], true).unwrap();
+            repeat(&mut bench, short)
+        }
+        Cause::BadValue => {
+            let frame = not_a_number(&bench.next_feedback());
+            repeat(&mut bench, frame)
+        }
+        Cause::FollowingError => {
+            bench.position[1] += (0.1 * 50.0 / std::f64::consts::TAU * 131_072.0) as i32;
+            bench.run(3)
+        }
+        Cause::OverSpeed => {
+            // 1.1 x 2.2 m/s at 25 mm a turn are 608 rad/s at motor 3.
+            bench.velocity[2] = 610.0;
+            bench.run(3)
+        }
+        Cause::SoftLimit => {
+            bench.request(MotionRequest::Disable);
+            bench.put(&Vector4::new(0.2, 2.56, 0.15, 0.3));
+            bench.run(2);
+            let frame = bench.motion(MotionRequest::Enable);
+            bench.wire.to_node.push_back(frame);
+            bench.run(20)
+        }
+        Cause::EStop => {
+            bench.wire.to_node.push_back(estop());
+            bench.step()
+        }
+        Cause::DriveFault => {
+            bench.status = bench.status | DriveStatus::FAULT;
+            bench.step()
+        }
+        Cause::EncoderFault => {
+            bench.status = DriveStatus::READY;
+            bench.step()
+        }
+        Cause::None
+        | Cause::DuplicateNode
+        | Cause::StuckSensor
+        | Cause::Babbling
+        | Cause::BusOff
+        | Cause::OverTorque
+        | Cause::Overrun
+        | Cause::SchemaMismatch => return None,
+    };
+    Some((bench, sent))
+}
+
+/// Every cause of the fault table can be brought about, is latched, sent once, and repeated in the state with its number.
+#[test]
+fn every_cause_of_the_table_is_raised_and_reported_in_words() {
+    for cause in Cause::ALL {
+        let in_table = REACTIONS.iter().any(|row| row.cause == *cause);
+        let raised = raise(*cause);
+        assert_eq!(raised.is_some(), in_table, "{cause}");
+        let Some((bench, sent)) = raised else {
+            continue;
+        };
+        assert_eq!(bench.node.controller().cause(), *cause);
+        let emergencies = emergencies(&sent);
+        assert_eq!(emergencies.len(), 1, "{cause}");
+        let state = *states(&sent).last().expect("a state follows at once");
+        assert_eq!((emergencies[0].cause, state.cause), (*cause, *cause));
+        assert_eq!(emergencies[0].value(), state.fault_value, "{cause}");
+        let expected = match cause {
+            Cause::SelfTest => format!("self test: {}", KnownAnswer::Model),
+            Cause::FeedbackLost => "feedback lost: 7.0 ms, limit 5.0 ms".into(),
+            Cause::PeerSilent => "peer silent: 100.0 ms, limit 100.0 ms".into(),
+            Cause::Reordered => "reordered: 3 frames in a row".into(),
+            Cause::Corrupted => "corrupted: 3 frames in a row".into(),
+            Cause::BadValue => "bad value: 3 frames in a row".into(),
+            Cause::FollowingError => {
+                "following error, axis 2 (elbow): -0.100 rad, limit 0.050 rad".into()
+            }
+            Cause::OverSpeed => "over speed, axis 3 (lift): 2.43 m/s, limit 2.42 m/s".into(),
+            Cause::SoftLimit => "soft limit, axis 2 (elbow): 2.560 rad, limit 2.551 rad".into(),
+            Cause::EStop => "estop".to_owned(),
+            Cause::DriveFault => "drive fault: drive status ready fault encoder-valid".into(),
+            Cause::EncoderFault => "encoder fault: drive status ready".into(),
+            _ => String::new(),
+        };
+        assert_eq!(state.fault().to_string(), expected);
+    }
+}
+
+/// What stops the arm is a time, whatever the rate: 5 ms are 10 samples at 2 kHz.
+#[test]
+fn a_gap_is_judged_by_its_time() {
+    for (lost, expected) in [(9, Mode::Enabled), (10, Mode::FaultReaction)] {
+        let mut bench = Bench::with(Config::new(IRB_930, 0.5e-3));
+        bench.enable();
+        bench.run(100);
+        assert_eq!(bench.mode(), Mode::Enabled);
+        (0..lost).for_each(|_| bench.lose());
+        bench.step();
+        assert_eq!(bench.mode(), expected, "{lost} lost");
+    }
+}
+
+/// A limit that has acted in one sample of twenty is in the next report, and only there.
+#[test]
+fn limits_are_kept_until_they_are_reported() {
+    let mut bench = Bench::enabled();
+    let mut reports = Vec::new();
+    for sample in 0..200 {
+        if sample == 50 {
+            bench.lose();
+        }
+        reports.extend(states(&bench.step()).iter().map(|state| state.limits));
+    }
+    let with = |limits: &&LimitFlags| limits.contains(LimitFlags::PREDICTED);
+    assert_eq!(reports.iter().filter(with).count(), 1, "{reports:?}");
+}
+
+/// A failed self-test is left by nothing.
+#[test]
+fn a_failed_self_test_stays() {
+    let (mut bench, _) = raise(Cause::SelfTest).unwrap();
+    bench.hello(protocol::table::HASH);
+    bench.wire.to_node.push_back(estop());
+    bench.run(5);
+    bench.request(MotionRequest::Stop);
+    bench.request(MotionRequest::FaultReset);
+    bench.request(MotionRequest::Enable);
+    assert_eq!(bench.mode(), Mode::SelfTest);
+    let sent = bench.run(100);
+    assert!(emergencies(&sent).is_empty(), "it has been said");
+    assert_eq!(states(&sent)[0].fault().to_string(), "self test: model");
 }

@@ -4,4 +4,5 @@ mod bench;
 mod faults;
 mod reports;
 mod requests;
+mod stops;
 mod switching;

@@ -1,6 +1,9 @@
 //! What an operator asks for, and the answers.
 
-use protocol::messages::{Message, MotionRequest, Outcome, RefusalReason};
+use firmware::control::controller::{Config, Controller};
+use firmware::control::states::Event;
+use firmware::mechanics::arm::IRB_930;
+use protocol::messages::{Compensation, Law, Message, MotionRequest, Outcome, RefusalReason};
 
 use crate::bench::Bench;
 
@@ -67,4 +70,62 @@ fn replies(sent: &[Message]) -> usize {
     sent.iter()
         .filter(|message| matches!(message, Message::MotionReply(_)))
         .count()
+}
+
+#[test]
+fn a_compensation_that_the_law_does_not_take_is_refused() {
+    let mut bench = Bench::enabled();
+    let select = |law, compensation| MotionRequest::SelectLaw { law, compensation };
+    for law in Law::ALL {
+        for compensation in Compensation::ALL {
+            let taken = *compensation == Compensation::None
+                || matches!(law, Law::ComputedTorqueJoint | Law::ComputedTorqueTask);
+            let outcome = bench.request(select(*law, *compensation));
+            if taken {
+                assert_eq!(outcome, Some(Outcome::Accepted), "{law}:{compensation}");
+            } else {
+                assert_eq!(
+                    bench.refusal(select(*law, *compensation)),
+                    RefusalReason::NoCompensation,
+                    "{law}:{compensation}"
+                );
+            }
+        }
+    }
+}
+
+/// The codec lets none of these through; the controller does not rely on it.
+#[test]
+fn a_payload_is_checked_by_the_rule_of_the_model() {
+    let refused = |mass: f32, com: f32, inertia: f32| {
+        let mut controller = Controller::new(Config::new(IRB_930, 1e-3));
+        controller.event(Event::SelfTestPassed);
+        let request = MotionRequest::SetPayload {
+            mass,
+            com: [com; 3],
+            inertia: [inertia; 3],
+        };
+        controller.request(1, &request);
+        match controller.take_reply().unwrap().outcome {
+            Outcome::Accepted => None,
+            Outcome::Refused(refusal) => Some((refusal.reason, refusal.value, refusal.limit)),
+        }
+    };
+    assert_eq!(refused(2.0, 0.1, 0.1), None);
+    assert_eq!(
+        refused(23.0, 0.1, 0.1),
+        Some((RefusalReason::PayloadTooHeavy, 23.0, 22.0))
+    );
+    assert_eq!(
+        refused(-1.0, 0.1, 0.1),
+        Some((RefusalReason::OutOfRange, -1.0, 0.0))
+    );
+    assert_eq!(
+        refused(2.0, 0.1, -0.5),
+        Some((RefusalReason::OutOfRange, -0.5, 0.0))
+    );
+    assert_eq!(
+        refused(2.0, f32::NAN, 0.1),
+        Some((RefusalReason::NotFinite, 0.0, 0.0))
+    );
 }

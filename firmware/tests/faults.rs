@@ -1,0 +1,112 @@
+//! The fault table: against a second copy written by hand, and against the docs.
+
+use std::fmt::Write;
+
+use firmware::control::fault::{Latch, Limit, REACTIONS, Reaction};
+use protocol::messages::Cause;
+
+#[path = "common/table.rs"]
+mod table;
+
+/// The table once more, from the safety rules and not from the code: cause, limit, reaction of an arm that works, stops,
+/// closes its brake, and what ends the fault.
+const ORACLE: &str = "
+self-test       at once      nothing        nothing        nothing        restart
+feedback-lost   5 ms         stop           brake          nothing        reset
+peer-silent     100 ms       off            off            off            reset
+reordered       3 frames     stop           brake          nothing        reset
+corrupted       3 frames     stop           brake          nothing        reset
+bad-value       3 frames     off            off            off            reset
+following-error each axis    stop           brake          off            reset
+over-speed      each axis    stop           brake          off            reset
+soft-limit      each axis    stop           nothing        nothing        reset
+estop           at once      emergency stop emergency stop emergency stop reset
+drive-fault     at once      brake          brake          nothing        reset
+encoder-fault   at once      off            off            off            reset
+";
+
+fn limit(limit: Limit) -> String {
+    match limit {
+        Limit::AtOnce => "at once".into(),
+        Limit::Milliseconds(ms) => format!("{ms} ms"),
+        Limit::Frames(frames) => format!("{frames} frames"),
+        Limit::EachAxis => "each axis".into(),
+    }
+}
+
+fn reaction(reaction: Reaction) -> &'static str {
+    match reaction {
+        Reaction::None => "nothing",
+        Reaction::Stop => "stop",
+        Reaction::Brake => "brake",
+        Reaction::Off => "off",
+        Reaction::EmergencyStop => "emergency stop",
+    }
+}
+
+fn latch(latch: Latch) -> &'static str {
+    match latch {
+        Latch::Reset => "reset",
+        Latch::Restart => "restart",
+    }
+}
+
+/// Who notices, for the docs; no code depends on it.
+fn seen_by(cause: Cause) -> &'static str {
+    match cause {
+        Cause::SelfTest => "known answers of mathematics, kinematics and CRC; ranges of the model",
+        Cause::FeedbackLost => "sample number of the next feedback",
+        Cause::PeerSilent => "age of the feedback",
+        Cause::Reordered => "counter of the feedback: repeated or old",
+        Cause::Corrupted => "format, length or CRC of the feedback",
+        Cause::BadValue => "value in the feedback; once in a torque of the law",
+        Cause::FollowingError => "reference against encoder",
+        Cause::OverSpeed => "speed of the encoder",
+        Cause::SoftLimit => "position against range",
+        Cause::EStop => "emergency stop on the bus",
+        Cause::DriveFault => "status of the drives",
+        Cause::EncoderFault => "status of the drives; a jump no axis can make",
+        other => panic!("{other} is in the table: say who notices it"),
+    }
+}
+
+#[test]
+fn the_table_is_that_of_the_safety_rules() {
+    let mut oracle: Vec<&str> = ORACLE.trim().lines().collect();
+    for row in &REACTIONS {
+        let line = format!(
+            "{:15} {:12} {:14} {:14} {:14} {}",
+            row.cause.name(),
+            limit(row.limit),
+            reaction(row.reaction),
+            reaction(row.stopping),
+            reaction(row.closing),
+            latch(row.latch)
+        );
+        let at = oracle.iter().position(|expected| *expected == line);
+        oracle.remove(at.unwrap_or_else(|| panic!("not expected, or twice: {line}")));
+    }
+    assert!(oracle.is_empty(), "missing: {oracle:?}");
+}
+
+#[test]
+fn the_docs_have_the_table() {
+    let mut text = String::from(
+        "| fault | seen by | limit | reaction | while stopping | while the brake closes | until |\n\
+         |---|---|---|---|---|---|---|\n",
+    );
+    for row in &REACTIONS {
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {} | {} | {} | {} |",
+            row.cause,
+            seen_by(row.cause),
+            limit(row.limit),
+            reaction(row.reaction),
+            reaction(row.stopping),
+            reaction(row.closing),
+            latch(row.latch)
+        );
+    }
+    table::compare("faults", &text);
+}

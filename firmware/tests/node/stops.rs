@@ -1,0 +1,132 @@
+//! What goes to the drives after a fault: which stop, and what happens to it.
+
+use firmware::control::controller::Config;
+use firmware::mechanics::arm::IRB_930;
+use protocol::messages::{Cause, ControlWord, DriveStatus, FaultAxis, MotionRequest};
+
+use crate::bench::{Bench, estop, is_off};
+use crate::faults::states;
+
+const OFF: ControlWord = ControlWord::EMPTY;
+const BRAKE: ControlWord = ControlWord::TORQUE_ENABLE;
+const ESTOP_BRAKE: ControlWord = ControlWord::TORQUE_ENABLE.with(ControlWord::ESTOP, true);
+const ESTOP_STOPPING: ControlWord = ESTOP_BRAKE
+    .with(ControlWord::BRAKE_RELEASE, true)
+    .with(ControlWord::QUICK_STOP, true);
+
+/// Words without repetitions.
+fn course(words: &[ControlWord]) -> Vec<ControlWord> {
+    let mut course = words.to_vec();
+    course.dedup();
+    course
+}
+
+/// A loop must not be closed through an encoder that is lost or lies, not even to stop.
+#[test]
+fn a_bad_encoder_takes_brake_and_torque_off_in_the_same_command() {
+    let lost = |bench: &mut Bench| bench.status = DriveStatus::READY;
+    let jumped = |bench: &mut Bench| {
+        bench.follows = false;
+        // One turn of motor 1 is 0.079 rad; ten are more than the axis can move in any gap.
+        bench.position[0] += 10 * 131_072;
+    };
+    for harm in [lost, jumped] {
+        for mut bench in [Bench::enabled(), Bench::moving()] {
+            harm(&mut bench);
+            let command = bench.command();
+            assert!(is_off(&command), "{command:?}");
+            let fault = *bench.node.controller().fault();
+            assert_eq!(fault.cause, Cause::EncoderFault);
+            // Stopping or closing its brake, the arm does the same.
+            let mut bench = Bench::moving();
+            bench.wire.to_node.push_back(estop());
+            assert_eq!(bench.command().control, ESTOP_STOPPING);
+            harm(&mut bench);
+            assert_eq!(bench.command().control, ControlWord::ESTOP);
+        }
+    }
+    let mut bench = Bench::moving();
+    jumped(&mut bench);
+    let sent = bench.step();
+    let state = states(&sent)[0];
+    assert_eq!(state.fault_axis, FaultAxis::Shoulder);
+    assert!(state.fault_value.abs() > 0.7, "{}", state.fault());
+}
+
+/// The faulty drive may be that of the lift: nothing but the brake holds it then.
+#[test]
+fn a_drive_in_fault_closes_the_brake_first() {
+    let mut bench = Bench::moving();
+    bench.status = bench.status | DriveStatus::FAULT;
+    let words = bench.words(200);
+    assert_eq!(course(&words), [BRAKE, OFF]);
+    let closing = words.iter().filter(|word| **word == BRAKE).count();
+    // The brake takes 30 ms to close.
+    assert!((30..=61).contains(&closing), "{closing} samples");
+}
+
+#[test]
+fn a_fault_while_stopping_goes_straight_to_the_brake() {
+    let drive_fault = |bench: &mut Bench| bench.status = bench.status | DriveStatus::FAULT;
+    let lost_feedback = |bench: &mut Bench| (0..6).for_each(|_| bench.lose());
+    for harm in [drive_fault, lost_feedback] {
+        let mut bench = Bench::moving();
+        bench.wire.to_node.push_back(estop());
+        assert_eq!(bench.command().control, ESTOP_STOPPING);
+        harm(&mut bench);
+        let words = bench.words(200);
+        assert_eq!(course(&words), [ESTOP_BRAKE, ControlWord::ESTOP]);
+        assert_eq!(
+            bench.node.controller().cause(),
+            Cause::EStop,
+            "the first cause stays"
+        );
+    }
+}
+
+/// A stop that the arm does not follow closes the brake; torque that it does not follow even then goes.
+#[test]
+fn a_stop_that_is_not_followed_ends_at_the_brake() {
+    let mut bench = Bench::moving();
+    bench.wire.to_node.push_back(estop());
+    bench.step();
+    bench.follows = false;
+    bench.velocity = [0.0; 4];
+    let words = bench.words(60);
+    let expected = [ESTOP_STOPPING, ESTOP_BRAKE, ControlWord::ESTOP];
+    assert_eq!(course(&words), expected);
+    let closing = words.iter().filter(|word| **word == ESTOP_BRAKE).count();
+    assert_eq!(closing, 3, "three samples in a row");
+}
+
+/// Undisturbed, a stop comes to rest on the path before the brake closes.
+#[test]
+fn a_stop_that_is_followed_ends_at_rest() {
+    let mut bench = Bench::moving();
+    bench.wire.to_node.push_back(estop());
+    let mut closing = 0;
+    while bench.command().control == ESTOP_STOPPING {}
+    let here = bench.node.controller().reference().q;
+    while bench.command().control == ESTOP_BRAKE {
+        assert_eq!(bench.node.controller().reference().q, here);
+        closing += 1;
+    }
+    assert!((30..=61).contains(&closing), "{closing} samples");
+    assert_eq!(bench.command().control, ControlWord::ESTOP);
+}
+
+#[test]
+fn a_law_without_a_finite_torque_takes_brake_and_torque_off() {
+    let mut config = Config::new(IRB_930, 1e-3);
+    config.selection.gains.bandwidth = f32::NAN;
+    let mut bench = Bench::with(config);
+    bench.hello(protocol::table::HASH);
+    bench.run(2);
+    bench.request(MotionRequest::Stop);
+    let frame = bench.motion(MotionRequest::Enable);
+    bench.wire.to_node.push_back(frame);
+    for _ in 0..3 {
+        assert!(is_off(&bench.command()));
+    }
+    assert_eq!(bench.node.controller().cause(), Cause::BadValue);
+}

@@ -1,0 +1,150 @@
+//! Codes that the protocol has and no node raises yet. The lists only ever get shorter.
+//!
+//! A code counts as raised when the source of the node names it. Whether it is raised when it should be is for other tests
+//! to say; this one sees to it that the docs of a code do not promise more than there is.
+
+use std::fs;
+use std::path::Path;
+
+use protocol::messages::{Cause, ParameterError, RefusalReason};
+
+const CAUSES: [Cause; 7] = [
+    Cause::DuplicateNode,
+    Cause::StuckSensor,
+    Cause::Babbling,
+    Cause::BusOff,
+    Cause::OverTorque,
+    Cause::Overrun,
+    Cause::SchemaMismatch,
+];
+const LIMIT_FLAGS: [&str; 9] = [
+    "VELOCITY_SHOULDER",
+    "VELOCITY_ELBOW",
+    "VELOCITY_LIFT",
+    "VELOCITY_WRIST",
+    "POSITION_SHOULDER",
+    "POSITION_ELBOW",
+    "POSITION_LIFT",
+    "POSITION_WRIST",
+    "DAMPED",
+];
+const PARAMETER_ERRORS: [ParameterError; 3] = [
+    ParameterError::ReadOnly,
+    ParameterError::OutOfRange,
+    ParameterError::NotNow,
+];
+const REFUSALS: [RefusalReason; 0] = [];
+
+const MARK: &str = "Reserved: not raised yet.";
+
+/// Every line of code below `folder`, without comments.
+fn code(folder: &Path, text: &mut String) {
+    for entry in fs::read_dir(folder).expect("the sources can be read") {
+        let path = entry.expect("the sources can be read").path();
+        if path.is_dir() {
+            code(&path, text);
+        } else if path.extension().is_some_and(|end| end == "rs") {
+            let source = fs::read_to_string(&path).expect("the sources can be read");
+            for line in source.lines().filter(|line| !line.trim().starts_with("//")) {
+                *text += line;
+                *text += "\n";
+            }
+        }
+    }
+}
+
+fn node() -> String {
+    let mut text = String::new();
+    code(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("src"),
+        &mut text,
+    );
+    text
+}
+
+/// Whether `code` names `path`, and not only something that begins like it.
+fn names(code: &str, path: &str) -> bool {
+    code.match_indices(path).any(|(at, _)| {
+        let next = code[at + path.len()..].chars().next();
+        !next.is_some_and(|c| c.is_alphanumeric() || c == '_')
+    })
+}
+
+/// Of all codes the reserved ones, and only they, are not raised and say so.
+fn check<T: Copy + std::fmt::Debug + PartialEq>(
+    kind: &str,
+    all: &[T],
+    reserved: &[T],
+    describe: impl Fn(T) -> &'static str,
+) {
+    let code = node();
+    for item in all {
+        let path = format!("{kind}::{item:?}");
+        let is_reserved = reserved.contains(item);
+        assert_ne!(
+            names(&code, &path),
+            is_reserved,
+            "{path}: a code that is raised leaves the list here, and no code enters it"
+        );
+        assert_eq!(
+            describe(*item).contains(MARK),
+            is_reserved,
+            "{path}: its doc comment says '{MARK}' for as long as that is true"
+        );
+    }
+}
+
+#[test]
+fn causes() {
+    check("Cause", Cause::ALL, &CAUSES, Cause::describe);
+}
+
+#[test]
+fn reasons_of_refusals() {
+    check(
+        "RefusalReason",
+        RefusalReason::ALL,
+        &REFUSALS,
+        RefusalReason::describe,
+    );
+}
+
+#[test]
+fn errors_of_parameters() {
+    check(
+        "ParameterError",
+        ParameterError::ALL,
+        &PARAMETER_ERRORS,
+        ParameterError::describe,
+    );
+    let answers_a_value = names(&node(), "ParameterReply::Value");
+    assert!(
+        !answers_a_value,
+        "parameters have values now: take this line away"
+    );
+}
+
+#[test]
+fn limit_flags() {
+    let code = node();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../protocol/src/messages/cyclic.rs");
+    let source = fs::read_to_string(path).expect("the sources can be read");
+    let flags = source
+        .split_once("pub struct LimitFlags")
+        .expect("the flags are declared there")
+        .1;
+    let mut doc = "";
+    let mut seen = 0;
+    for line in flags.lines().map(str::trim) {
+        if line.starts_with("///") {
+            doc = line;
+        } else if let Some((flag, _)) = line.split_once(" = ") {
+            let reserved = LIMIT_FLAGS.contains(&flag);
+            let path = format!("LimitFlags::{flag}");
+            assert_ne!(names(&code, &path), reserved, "{path}");
+            assert_eq!(doc.contains(MARK), reserved, "{path}: {doc}");
+            seen += 1;
+        }
+    }
+    assert_eq!(seen, protocol::messages::LimitFlags::NAMES.len());
+}

@@ -1,0 +1,307 @@
+//! The state machine, walked over every state and every event, judged by what goes to the drives.
+
+use std::fmt::Write;
+
+use firmware::control::controller::{Config, Controller, Readings};
+use firmware::control::states::{Event, Halt, State, TRANSITIONS};
+use firmware::mechanics::arm::IRB_930;
+use firmware::mechanics::dynamics::drive::Drive;
+use nalgebra::Vector4;
+use protocol::messages::{Compensation, ControlWord, DriveStatus};
+
+#[path = "common/table.rs"]
+mod table;
+
+/// The letters of [`EXPECTED`]: what the drives are told.
+fn word(letter: char) -> ControlWord {
+    let torque = ControlWord::TORQUE_ENABLE;
+    let released = torque | ControlWord::BRAKE_RELEASE;
+    let stopping = released | ControlWord::QUICK_STOP;
+    match letter {
+        // Torque off, brake closed.
+        'o' => ControlWord::EMPTY,
+        // Torque on, brake released.
+        'T' => released,
+        // The same in a controlled stop.
+        'S' => stopping,
+        // Torque on, brake closing.
+        'B' => torque,
+        // The same three in an emergency stop.
+        'x' => ControlWord::ESTOP,
+        'X' => stopping | ControlWord::ESTOP,
+        'C' => torque | ControlWord::ESTOP,
+        other => panic!("no control word {other}"),
+    }
+}
+
+/// Events in the order of the columns of [`EXPECTED`].
+const COLUMNS: [Event; 15] = [
+    Event::SelfTestPassed,
+    Event::PeerReady,
+    Event::Enable,
+    Event::Disable,
+    Event::BrakeOpen,
+    Event::BrakeClosed,
+    Event::Start,
+    Event::Arrived,
+    Event::Stop,
+    Event::AtRest,
+    Event::FaultStop,
+    Event::FaultBrake,
+    Event::FaultOff,
+    Event::EmergencyStop,
+    Event::Reset,
+];
+
+/// State, how it is reached, and what goes to the drives after each event. Written by hand: what the cabinet is to do.
+const EXPECTED: [(&str, &[Event], &str); 14] = {
+    use Event::{
+        AtRest, BrakeClosed, BrakeOpen, Disable, EmergencyStop, Enable, FaultOff, FaultStop,
+        PeerReady, SelfTestPassed, Start, Stop,
+    };
+    const READY: &[Event] = &[SelfTestPassed, PeerReady];
+    [
+        // pass peer enable disable open closed start arrived stop rest fault-stop -brake -off estop reset
+        ("SelfTest", &[], "ooooooooooooooo"),
+        ("PreOperational", &[SelfTestPassed], "oooooooooooooxo"),
+        ("Ready", READY, "ooTooooooooooxo"),
+        (
+            "Enabling",
+            &[SelfTestPassed, PeerReady, Enable],
+            "TTTBTTTTTTBBoCT",
+        ),
+        (
+            "Enabled",
+            &[SelfTestPassed, PeerReady, Enable, BrakeOpen],
+            "TTTBTTTTTTSBoXT",
+        ),
+        (
+            "Moving",
+            &[SelfTestPassed, PeerReady, Enable, BrakeOpen, Start],
+            "TTTTTTTTSTSBoXT",
+        ),
+        (
+            "QuickStop",
+            &[SelfTestPassed, PeerReady, Enable, BrakeOpen, Start, Stop],
+            "SSSSSSSSSTSBoXS",
+        ),
+        (
+            "Disabling",
+            &[SelfTestPassed, PeerReady, Enable, BrakeOpen, Disable],
+            "BBBBBoBBBBBBoCB",
+        ),
+        (
+            "FaultStopping",
+            &[
+                SelfTestPassed,
+                PeerReady,
+                Enable,
+                BrakeOpen,
+                Start,
+                FaultStop,
+            ],
+            "SSSSSSSSSBSBoXS",
+        ),
+        (
+            "FaultClosing",
+            &[SelfTestPassed, PeerReady, Enable, FaultStop],
+            "BBBBBoBBBBBBoCB",
+        ),
+        (
+            "FaultOff",
+            &[SelfTestPassed, PeerReady, Enable, FaultOff],
+            "oooooooooooooxo",
+        ),
+        (
+            "EStopStopping",
+            &[
+                SelfTestPassed,
+                PeerReady,
+                Enable,
+                BrakeOpen,
+                Start,
+                EmergencyStop,
+            ],
+            "XXXXXXXXXCXCxXX",
+        ),
+        (
+            "EStopClosing",
+            &[
+                SelfTestPassed,
+                PeerReady,
+                Enable,
+                BrakeOpen,
+                EmergencyStop,
+                AtRest,
+            ],
+            "CCCCCxCCCCCCxCC",
+        ),
+        (
+            "EStopOff",
+            &[
+                SelfTestPassed,
+                PeerReady,
+                Enable,
+                EmergencyStop,
+                BrakeClosed,
+            ],
+            "xxxxxxxxxxxxxxo",
+        ),
+    ]
+};
+
+fn name(state: State) -> &'static str {
+    match state {
+        State::SelfTest => "SelfTest",
+        State::PreOperational => "PreOperational",
+        State::Ready => "Ready",
+        State::Enabling(_) => "Enabling",
+        State::Enabled => "Enabled",
+        State::Moving => "Moving",
+        State::QuickStop => "QuickStop",
+        State::Disabling(_) => "Disabling",
+        State::Fault(Halt::Stopping) => "FaultStopping",
+        State::Fault(Halt::Closing(_)) => "FaultClosing",
+        State::Fault(Halt::Off) => "FaultOff",
+        State::EStop(Halt::Stopping) => "EStopStopping",
+        State::EStop(Halt::Closing(_)) => "EStopClosing",
+        State::EStop(Halt::Off) => "EStopOff",
+    }
+}
+
+/// A controller that has seen these events. It takes the model at its word: no observer makes up for torques that the
+/// readings here do not have.
+fn after(events: &[Event]) -> Controller {
+    let mut config = Config::new(IRB_930, 1e-3);
+    config.selection.compensation = Compensation::None;
+    let mut controller = Controller::new(config);
+    for event in events {
+        assert!(controller.event(*event), "{event:?} of {events:?}");
+    }
+    controller
+}
+
+/// Readings of an arm at rest.
+fn at_rest() -> Readings {
+    let drive = Drive::new(&IRB_930.drive);
+    let q = Vector4::new(0.2, 1.5, 0.15, 0.3);
+    Readings {
+        steps: 1,
+        status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
+        counts: drive.counts_of_motor_angle(&drive.motor_angle(&q)),
+        speed: Vector4::zeros(),
+        torque: Vector4::zeros(),
+    }
+}
+
+#[test]
+fn every_event_in_every_state_sends_the_word_that_it_is_to_send() {
+    assert_eq!(COLUMNS.len(), Event::ALL.len());
+    assert!(Event::ALL.iter().all(|event| COLUMNS.contains(event)));
+    for (state, way, words) in EXPECTED {
+        assert_eq!(name(after(way).state()), state);
+        assert_eq!(words.len(), COLUMNS.len(), "{state}");
+        for (event, letter) in COLUMNS.into_iter().zip(words.chars()) {
+            let mut controller = after(way);
+            controller.event(event);
+            assert_eq!(
+                controller.control_word(),
+                word(letter),
+                "{state}, {event:?}: is {:?}, expected {letter}",
+                controller.state()
+            );
+        }
+    }
+}
+
+/// No state of the table is missing above.
+#[test]
+fn every_state_is_walked() {
+    let mut states: Vec<_> = TRANSITIONS
+        .iter()
+        .flat_map(|(from, _, to)| [name(*from), name(*to)])
+        .collect();
+    states.sort_unstable();
+    states.dedup();
+    let mut walked = EXPECTED.map(|(state, ..)| state);
+    walked.sort_unstable();
+    assert_eq!(states, walked);
+}
+
+/// Whatever has happened, the next command carries the lift or has its brake closed: the weight of lift and shaft,
+/// 1.95 kg, on motor 3 is m g / (2 pi / 25 mm) = 0.076 N m.
+#[test]
+fn the_lift_never_falls() {
+    let carried = -1.95 * 9.81 / (std::f32::consts::TAU / 0.025);
+    for (state, way, _) in EXPECTED {
+        for event in Event::ALL {
+            let mut controller = after(&[]);
+            controller.step(&at_rest(), &mut ());
+            for event in way {
+                controller.event(*event);
+                controller.step(&at_rest(), &mut ());
+            }
+            controller.event(event);
+            for sample in 0..200 {
+                let actions = controller.step(&at_rest(), &mut ());
+                let [_, _, lift, _] = actions.torque;
+                if actions.control.contains(ControlWord::TORQUE_ENABLE) {
+                    assert!(
+                        (lift - carried).abs() < 0.01 * carried.abs(),
+                        "{state}, {event:?}, sample {sample}: {lift} N m, {carried} N m carry the lift"
+                    );
+                } else {
+                    assert!(!actions.control.contains(ControlWord::BRAKE_RELEASE));
+                    assert_eq!(actions.torque, [0.0; 4]);
+                }
+            }
+        }
+    }
+}
+
+/// A stop that has begun ends without torque, however it goes on.
+#[test]
+fn every_halt_ends_without_torque() {
+    for (state, way, _) in EXPECTED {
+        let mut controller = after(way);
+        if controller.state().halt().is_none() {
+            continue;
+        }
+        for _ in 0..200 {
+            controller.step(&at_rest(), &mut ());
+        }
+        assert_eq!(
+            controller.state().halt(),
+            Some(Halt::Off),
+            "{state} does not end"
+        );
+    }
+}
+
+/// The drawing in the docs is the table.
+#[test]
+fn the_drawing_is_that_of_the_table() {
+    let mut drawing = String::from("```mermaid\nstateDiagram-v2\n    [*] --> SelfTest\n");
+    let mut drawn = Vec::new();
+    for (from, _, to) in TRANSITIONS {
+        let arrow = (name(from), name(to));
+        if drawn.contains(&arrow) {
+            continue;
+        }
+        drawn.push(arrow);
+        let events: Vec<_> = TRANSITIONS
+            .iter()
+            .filter(|(f, _, t)| (name(*f), name(*t)) == arrow)
+            .map(|(_, event, _)| format!("{event:?}"))
+            .collect();
+        let _ = writeln!(
+            drawing,
+            "    {} --> {}: {}",
+            arrow.0,
+            arrow.1,
+            events.join(", ")
+        );
+    }
+    drawing += "```\n";
+    table::compare("transitions", &drawing);
+}
