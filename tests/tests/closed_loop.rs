@@ -188,6 +188,29 @@ fn a_stop_stays_on_the_path() {
     }
 }
 
+/// A robot with forty times the friction that the controller knows of does not follow: the results say which axis, and how
+/// far from what is allowed.
+#[test]
+fn a_fault_is_named_by_axis_value_and_limit() {
+    let mut scenario = gate(1);
+    scenario.law = "computed-torque:none".parse().unwrap();
+    scenario.mismatch.friction = 40.0;
+    let summary = in_process(&RunConfig::new(scenario), &mut ()).unwrap();
+    assert!(!summary.completed);
+    let fault = &summary.faults[0];
+    assert_eq!(fault.cause, "following-error");
+    let axis = fault.axis.expect("one axis is to blame");
+    assert!(fault.value.abs() > fault.limit && fault.limit > 0.0);
+    assert_eq!(fault.unit, if axis == "lift" { "m" } else { "rad" });
+    let begins = format!(
+        "following error, axis {} ({axis}): ",
+        fault.text.as_bytes()[22] - b'0'
+    );
+    assert!(fault.text.starts_with(&begins), "{}", fault.text);
+    assert!(fault.text.contains(", limit "), "{}", fault.text);
+    assert!(summary.error.unwrap().ends_with(&fault.text));
+}
+
 #[test]
 fn what_cannot_be_done_is_refused_with_the_reason() {
     let mut scenario = gate(1);

@@ -161,8 +161,12 @@ fn of_axis(cause: Cause, axis: Axis, value: &Vector4<f32>, limit: &Vector4<f32>)
             Axis::Lift => FaultAxis::Lift,
             Axis::Wrist => FaultAxis::Wrist,
         },
-        // Finite, since no other number can be reported.
-        value: axis.of(value).max(f32::MIN).min(f32::MAX),
+        value: finite(axis.of(value)),
         limit: axis.of(limit),
     }
+}
+
+/// The nearest number that can be reported.
+fn finite(value: f32) -> f32 {
+    if value.is_finite() { value } else { f32::MAX }
 }
