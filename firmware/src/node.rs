@@ -1,20 +1,23 @@
 //! The controller on the bus: frames in, one control sample when feedback arrives, frames out.
 //!
-//! Arrival drives, a timer guards: [`Node::poll`] is called when a frame has come and at least
-//! once a sample; only feedback moves the control on, the time handed in only ages it. So
-//! lock-step, a virtual bus in real time and a real bus run one and the same path.
+//! Arrival drives, a timer guards: [`Node::poll`] is called with each frame that has come, and
+//! without one when none comes for some samples; only feedback moves the control on, the time
+//! handed in only ages it. So lock-step, a virtual bus in real time and a real bus run one and
+//! the same path.
 
 use nalgebra::Vector4;
-use protocol::bus::Bus;
-use protocol::codec::{self, DecodeError};
+use protocol::bus::Transmit;
+use protocol::codec::{self, DecodeError, Encoder};
 use protocol::counters::Counters;
 use protocol::e2e::{Profile, Receiver, Verdict};
+use protocol::frame::CanFrame;
 use protocol::messages::{
     Cause, Command, DriveStatus, Emergency, Fault, Feedback, Heartbeat, Hello, Message, Mode,
     Motion, MotionRequest, NmtCommand, Node as Name, ParameterReply, ParameterRequest, Refusal,
     RefusalReason, ResetReason, Server, State,
 };
 use protocol::table;
+use protocol::time::{Duration, Instant};
 
 use crate::control::controller::{Config, Controller, Readings};
 use crate::control::fault::{BAD_FRAMES, PEER_TIMEOUT_MS};
@@ -22,31 +25,18 @@ use crate::control::phase::{Phase, Probe};
 use crate::control::self_test;
 use crate::control::states::Event;
 
-/// Frames taken from the bus in one call; more wait for the next.
-pub const FRAMES_PER_POLL: usize = 8;
-/// Age of the feedback, µs, at which the drives count as silent: torque off, brake.
-pub const PEER_TIMEOUT_US: u64 = PEER_TIMEOUT_MS as u64 * 1000;
-/// Period of the state message, µs.
-const STATE_PERIOD_US: u64 = 20_000;
-/// Period of the heartbeat, µs.
-const HEARTBEAT_PERIOD_US: u64 = 100_000;
+/// Age of the feedback at which the drives count as silent: torque off, brake.
+pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
+/// Period of the state message.
+const STATE_PERIOD: Duration = Duration::from_millis(20);
+/// Period of the heartbeat.
+const HEARTBEAT_PERIOD: Duration = Duration::from_millis(100);
 /// Planning rests in every tenth sample, so that what is to be reported waits no longer: half the period of the state at
 /// 1 kHz, for a tenth of the planning. In samples and not in time, so that the same feedback gives the same torques.
 const REPORT_SAMPLES: u32 = 10;
 /// Answers that may wait for such a sample; with more, reports come beside planning. Two leave the outbox room for a request
 /// in every sample until then.
 const MAX_ANSWERS_WAITING: usize = 2;
-
-/// Transmit counters, one an identifier.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sequence {
-    command: u8,
-    reply: u8,
-    state: u8,
-    emergency: u8,
-    parameter: u8,
-    heartbeat: u8,
-}
 
 /// A controller with its place on the bus.
 #[derive(Clone, Debug)]
@@ -55,12 +45,12 @@ pub struct Node {
     feedback: Receiver,
     motion: Receiver,
     parameter: Receiver,
-    sequence: Sequence,
+    encoder: Encoder,
     received: Counters,
     unsent: u16,
     bad_feedback: u8,
     /// Sample number and arrival of the newest feedback.
-    newest: Option<(u32, u64)>,
+    newest: Option<(u32, Instant)>,
     /// Samples answered.
     samples: u32,
     /// The drives were built from the same message table.
@@ -70,8 +60,8 @@ pub struct Node {
     /// Why the node was started, and whether network management has asked for another start.
     reset: ResetReason,
     reset_asked: bool,
-    next_state: u64,
-    next_heartbeat: u64,
+    next_state: Instant,
+    next_heartbeat: Instant,
 }
 
 impl Node {
@@ -84,7 +74,7 @@ impl Node {
             feedback: Receiver::new(Profile::Fd),
             motion: Receiver::new(Profile::Fd),
             parameter: Receiver::new(Profile::Fd),
-            sequence: Sequence::default(),
+            encoder: Encoder::default(),
             received: Counters::default(),
             unsent: 0,
             bad_feedback: 0,
@@ -95,8 +85,8 @@ impl Node {
             worst_tick: 0,
             reset,
             reset_asked: false,
-            next_state: 0,
-            next_heartbeat: 0,
+            next_state: Instant::ORIGIN,
+            next_heartbeat: Instant::ORIGIN,
         }
     }
 
@@ -130,14 +120,20 @@ impl Node {
         self.reset_asked
     }
 
-    /// Takes what has arrived, at most [`FRAMES_PER_POLL`] frames, and answers. `now` is a time
-    /// in µs that never runs backwards; where it starts does not matter.
-    pub fn poll<B: Bus>(&mut self, now: u64, bus: &mut B) {
-        self.poll_with(now, bus, &mut ());
+    /// Takes the frame that has arrived, if any, and sends into `bus` what is due. `now` never runs
+    /// backwards; where it starts does not matter.
+    pub fn poll<B: Transmit>(&mut self, now: Instant, received: Option<&CanFrame>, bus: &mut B) {
+        self.poll_with(now, received, bus, &mut ());
     }
 
     /// As [`Node::poll`], with a probe that measures the phases.
-    pub fn poll_with<B: Bus, P: Probe>(&mut self, now: u64, bus: &mut B, probe: &mut P) {
+    pub fn poll_with<B: Transmit, P: Probe>(
+        &mut self,
+        now: Instant,
+        received: Option<&CanFrame>,
+        bus: &mut B,
+        probe: &mut P,
+    ) {
         if self.controller.mode() == Mode::SelfTest {
             match self_test::run(self.controller.arm()) {
                 Ok(()) => {
@@ -151,13 +147,12 @@ impl Node {
             }
         }
         let mut planned = false;
-        for _ in 0..FRAMES_PER_POLL {
-            let Some(frame) = bus.receive() else { break };
-            match codec::decode(&frame) {
+        if let Some(frame) = received {
+            match codec::decode(frame) {
                 Ok(received) => {
-                    planned |= self.take(&received.message, received.counter, now, bus, probe);
+                    planned = self.take(&received.message, received.counter, now, bus, probe);
                 }
-                Err(error) => self.reject(error, &frame),
+                Err(error) => self.reject(error, frame),
             }
             if self.reset_asked {
                 return;
@@ -174,11 +169,11 @@ impl Node {
     }
 
     /// Acts on a message; returns whether it has led to planning.
-    fn take<B: Bus, P: Probe>(
+    fn take<B: Transmit, P: Probe>(
         &mut self,
         message: &Message,
         counter: Option<u8>,
-        now: u64,
+        now: Instant,
         bus: &mut B,
         probe: &mut P,
     ) -> bool {
@@ -217,10 +212,10 @@ impl Node {
 
     /// One control sample: the only place where the control moves on. Returns whether a move was
     /// planned on.
-    fn sample<B: Bus, P: Probe>(
+    fn sample<B: Transmit, P: Probe>(
         &mut self,
         feedback: &Feedback,
-        now: u64,
+        now: Instant,
         bus: &mut B,
         probe: &mut P,
     ) -> bool {
@@ -251,9 +246,7 @@ impl Node {
             control: actions.control,
             torque: actions.torque,
         };
-        let counter = self.sequence.command;
-        self.sequence.command = counter.wrapping_add(1);
-        self.send(&Message::Command(command), counter, bus);
+        self.send(&Message::Command(command), bus);
         probe.end(Phase::Encode);
         // Now that the command is on its way. By the count of samples and not by the time, so that
         // the same feedback gives the same torques whenever it comes.
@@ -282,7 +275,7 @@ impl Node {
         }
     }
 
-    fn parameter<B: Bus>(&mut self, request: &ParameterRequest, bus: &mut B) {
+    fn parameter<B: Transmit>(&mut self, request: &ParameterRequest, bus: &mut B) {
         let reply = match request {
             ParameterRequest::Hello(peer) => {
                 self.same_schema = peer.schema == table::HASH;
@@ -300,13 +293,7 @@ impl Node {
                 limit: 0.0,
             },
         };
-        let counter = self.sequence.parameter;
-        self.sequence.parameter = counter.wrapping_add(1);
-        self.send(
-            &Message::ParameterReply(Server::Controller, reply),
-            counter,
-            bus,
-        );
+        self.send(&Message::ParameterReply(Server::Controller, reply), bus);
     }
 
     /// Counts what the counter says was lost, repeated or late; `true` for a frame to act on.
@@ -315,7 +302,7 @@ impl Node {
         !matches!(verdict, Verdict::Duplicate | Verdict::Stale(_))
     }
 
-    fn reject(&mut self, error: DecodeError, frame: &protocol::frame::CanFrame) {
+    fn reject(&mut self, error: DecodeError, frame: &CanFrame) {
         self.received.refuse(&error);
         if table::FEEDBACK.identifies(frame) {
             self.suspect(match error {
@@ -338,13 +325,13 @@ impl Node {
     }
 
     /// Ages the feedback.
-    fn guard(&mut self, now: u64) {
+    fn guard(&mut self, now: Instant) {
         let Some((_, arrived)) = self.newest else {
             return;
         };
-        let age = now.saturating_sub(arrived);
-        if age > PEER_TIMEOUT_US {
-            let age_ms = age as f32 * 1e-3;
+        let age = now.since(arrived);
+        if age > PEER_TIMEOUT {
+            let age_ms = age.nanos() as f32 * 1e-6;
             self.controller.fail(Fault::value(
                 Cause::PeerSilent,
                 age_ms,
@@ -357,46 +344,30 @@ impl Node {
     }
 
     /// What is due: a reply, an emergency, state and heartbeat.
-    fn report<B: Bus>(&mut self, now: u64, bus: &mut B) {
+    fn report<B: Transmit>(&mut self, now: Instant, bus: &mut B) {
         // One a call: requests that are refused together are answered sample by sample.
         if let Some(reply) = self.controller.take_reply() {
-            let counter = self.sequence.reply;
-            self.sequence.reply = counter.wrapping_add(1);
-            self.send(&Message::MotionReply(reply), counter, bus);
+            self.send(&Message::MotionReply(reply), bus);
         }
         if let Some(alarm) = self.controller.take_alarm() {
             // The state that follows at once says which axis it was.
             self.next_state = now;
             let emergency = Emergency::new(alarm.cause, alarm.value.to_bits());
-            let counter = self.sequence.emergency;
-            self.sequence.emergency = counter.wrapping_add(1);
-            self.send(
-                &Message::Emergency(Name::Controller, emergency),
-                counter,
-                bus,
-            );
+            self.send(&Message::Emergency(Name::Controller, emergency), bus);
         }
         if now >= self.next_state {
-            self.next_state = now + STATE_PERIOD_US;
+            self.next_state = now + STATE_PERIOD;
             let state = self.state();
-            let counter = self.sequence.state;
-            self.sequence.state = counter.wrapping_add(1);
-            self.send(&Message::State(state), counter, bus);
+            self.send(&Message::State(state), bus);
         }
         if now >= self.next_heartbeat {
-            self.next_heartbeat = now + HEARTBEAT_PERIOD_US;
+            self.next_heartbeat = now + HEARTBEAT_PERIOD;
             let heartbeat = Heartbeat {
                 state: self.controller.mode(),
                 cause: self.controller.cause(),
                 reset: self.reset,
             };
-            let counter = self.sequence.heartbeat;
-            self.sequence.heartbeat = counter.wrapping_add(1);
-            self.send(
-                &Message::Heartbeat(Name::Controller, heartbeat),
-                counter,
-                bus,
-            );
+            self.send(&Message::Heartbeat(Name::Controller, heartbeat), bus);
         }
     }
 
@@ -424,8 +395,10 @@ impl Node {
         }
     }
 
-    fn send<B: Bus>(&mut self, message: &Message, counter: u8, bus: &mut B) {
-        let sent = codec::encode_with(message, counter, |frame| bus.transmit(frame));
+    fn send<B: Transmit>(&mut self, message: &Message, bus: &mut B) {
+        let sent = self
+            .encoder
+            .encode_with(message, |frame| bus.transmit(frame));
         if !matches!(sent, Ok(Ok(()))) {
             self.unsent = self.unsent.saturating_add(1);
         }

@@ -8,6 +8,7 @@ use firmware::mechanics::arm::IRB_930;
 use firmware::mechanics::dynamics::drive::Drive;
 use nalgebra::Vector4;
 use protocol::messages::{Compensation, ControlWord, DriveStatus};
+use protocol::time::Period;
 
 #[path = "common/table.rs"]
 mod table;
@@ -172,7 +173,7 @@ fn name(state: State) -> &'static str {
 /// A controller that has seen these events. It takes the model at its word: no observer makes up for torques that the
 /// readings here do not have.
 fn after(events: &[Event]) -> Controller {
-    let mut config = Config::new(IRB_930, 1e-3);
+    let mut config = Config::new(IRB_930, Period::of_rate(1000.0));
     config.selection.compensation = Compensation::None;
     let mut controller = Controller::new(config);
     for event in events {

@@ -11,7 +11,7 @@
 //! Foreign identifiers and error frames are counted, not judged.
 
 use firmware::mechanics::arm::ArmModel;
-use firmware::node::PEER_TIMEOUT_US;
+use firmware::node::PEER_TIMEOUT;
 use protocol::codec::{self, DecodeError};
 use protocol::e2e::{Receiver, Verdict};
 use protocol::frame::CanFrame;
@@ -163,7 +163,7 @@ impl Checker {
                 receiver: info.protection.map(Receiver::new),
                 seen_us: None,
                 limit_us: match info.rate {
-                    Rate::EverySample => Some(PEER_TIMEOUT_US),
+                    Rate::EverySample => Some(PEER_TIMEOUT.micros()),
                     Rate::Hertz(hertz) => Some(2_500_000 / u64::from(hertz)),
                     Rate::Event => None,
                 },

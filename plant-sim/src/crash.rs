@@ -1,18 +1,23 @@
 //! Faults of the controller on the emulated board, planted in mid-motion: what the pins, the drives and the bus show.
 
+use std::cell::RefCell;
 use std::path::Path;
+use std::rc::Rc;
 
 use channel::Fault;
 use firmware::cabinet::pins::{RUNNING, TORQUE_OFF};
 use firmware::cabinet::reset::Stop;
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{DriveStatus, Message, Mode, Nmt, NmtCommand, Node as Name, ResetReason};
+use protocol::messages::{DriveStatus, Message, Mode, Node as Name, ResetReason};
+use protocol::time::Instant;
 
+use crate::external::peers;
 use crate::qemu::{Channel, Options, Qemu};
-use sim::drives::HOLD_SAMPLES;
+use sim::drives::{Drives, HOLD_SAMPLES};
+use sim::observer::{Observer, Truth};
 use sim::operator::Operator;
-use sim::rig::{Observer, Rig, Truth};
+use sim::rig::Rig;
 use sim::setup::RunConfig;
 
 /// Samples for which the arm has been moving when the fault is planted.
@@ -153,40 +158,37 @@ pub fn plant(config: &RunConfig, image: &Path, planted: Planted) -> Result<Seen,
         ..Options::default()
     };
     let controller = Qemu::start(rig.controller(), &options).map_err(|error| text(&error))?;
-    let mut rig = Rig::new(&rig, controller);
-    let mut operator = Operator::new(&config.scenario);
+    let controller = Rc::new(RefCell::new(controller));
+    let drives = Drives::new(&rig.actual, rig.period);
+    let mut rig = Rig::new(&rig);
+    rig.attach(drives);
+    rig.attach(Operator::new(&config.scenario));
+    rig.attach(Rc::clone(&controller));
     let mut watch = Watch::default();
     while watch.moving < IN_MOTION {
-        rig.step(&mut operator, &mut watch)
+        rig.step(&mut (), &mut watch)
             .map_err(|error| text(&error))?;
-        if operator.is_done() {
-            return Err("the arm never moved for long enough".into());
+        if let Some(outcome) = rig.outcome() {
+            let why = outcome.as_ref().err().map(ToString::to_string);
+            return Err(why.unwrap_or_else(|| "the arm never moved for long enough".into()));
         }
     }
     match planted {
-        Planted::Fault(fault) => rig
-            .controller()
+        Planted::Fault(fault) => controller
+            .borrow_mut()
             .plant(fault)
             .map_err(|error| text(&error))?,
-        Planted::Reset(_) => rig.inject(&reset()),
+        Planted::Reset(_) => rig.inject(&peers::reset()),
     }
     watch.since = Some(0);
     // The operator waits for the end of its move, and asks for nothing more.
     for _ in 0..AFTERWARDS {
-        rig.step(&mut operator, &mut watch)
+        rig.step(&mut (), &mut watch)
             .map_err(|error| text(&error))?;
     }
-    watch.seen.stop = rig.controller().last_stop();
-    watch.seen.log = rig.controller().take_log()?;
+    watch.seen.stop = controller.borrow().last_stop();
+    watch.seen.log = controller.borrow_mut().take_log()?;
     Ok(watch.seen)
-}
-
-fn reset() -> CanFrame {
-    let reset = Nmt {
-        command: NmtCommand::ResetNode,
-        node: Name::Controller.code(),
-    };
-    codec::encode(&Message::Nmt(reset), 0).expect("two bytes without floats")
 }
 
 /// Watches the bus and the arm.
@@ -200,7 +202,7 @@ struct Watch {
 }
 
 impl Observer for Watch {
-    fn frame(&mut self, _: u64, frame: &CanFrame) -> std::io::Result<()> {
+    fn frame(&mut self, _: Instant, frame: &CanFrame) -> std::io::Result<()> {
         let (Some(samples), Ok(received)) = (self.since, codec::decode(frame)) else {
             return Ok(());
         };
@@ -224,9 +226,9 @@ impl Observer for Watch {
     }
 
     fn sample(&mut self, truth: &Truth) -> std::io::Result<()> {
-        self.moving += u32::from(truth.mode == Mode::Moving);
+        self.moving += u32::from(truth.mind.mode == Mode::Moving);
         self.since = self.since.map(|samples| samples + 1);
-        self.seen.lift = truth.qd[2];
+        self.seen.lift = truth.plant.qd[2];
         Ok(())
     }
 }

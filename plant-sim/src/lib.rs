@@ -16,3 +16,5 @@ pub mod progress;
 pub mod qemu;
 pub mod replay;
 pub mod run;
+pub mod twin;
+pub mod viewers;

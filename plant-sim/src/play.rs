@@ -5,7 +5,7 @@
 use std::time::{Duration, Instant};
 
 use link::{Link, LinkError};
-use protocol::bus::{Bus as _, TransmitError};
+use protocol::bus::{Transmit as _, TransmitError};
 use protocol::frame::CanFrame;
 
 use trace::{Entry, Record};

@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
+use sim::observer::Observer;
 use sim::operator::Hand;
-use sim::rig::Observer;
 
 /// Says on standard error how far a long run is.
 pub struct Progress {

@@ -1,27 +1,32 @@
 //! The controller as an image on an emulated Cortex-M4F, in lock-step, and held against its twin to the byte.
 
 mod board;
-mod difference;
 mod image;
 mod log;
 mod serial;
+mod supervise;
 
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
 
 pub use channel::Channel;
-use channel::{Fault, Measured, Request, Setup};
+use channel::{Fault, Request, Setup};
 use firmware::cabinet::reset::Stop;
-use firmware::cabinet::sample_clock::SampleClock;
 use firmware::control::controller::Config;
 use firmware::control::phase::Phase;
-use firmware::node::Node;
 pub use image::build;
 use protocol::frame::CanFrame;
+use protocol::messages::ResetReason;
+use protocol::time::Instant;
 
+use crate::external::peers;
+use crate::twin::Twin;
 use board::Board;
-use sim::endpoint::{Endpoint, EndpointError, InProcess};
+use sim::controller::COMPUTE;
+use sim::observer::Mind;
+use sim::peer::{Outbox, Peer, PeerError, World};
+use trace::difference::Difference;
 
 /// What the emulation is asked for.
 #[derive(Clone, Debug, Default)]
@@ -68,12 +73,12 @@ pub const COST_IMAGE: &str = "mps2-an386-cost";
 #[derive(Debug)]
 pub struct Qemu {
     image: PathBuf,
-    twin: InProcess,
-    expected: Vec<CanFrame>,
+    twin: Twin,
     board: Board,
-    /// Time on the UART: that of the drives' samples, since slcan carries no other.
-    clock: Option<SampleClock>,
-    period_ns: u64,
+    /// How frames travel; `None` once the bus is closed.
+    channel: Option<Channel>,
+    /// What the board has sent, empty between calls.
+    sent: Vec<CanFrame>,
     /// How the board ended when it last started again.
     last_stop: Option<Stop>,
     count: Option<Rc<RefCell<Costs>>>,
@@ -84,7 +89,7 @@ impl Qemu {
     ///
     /// # Errors
     /// The image cannot be built, the emulator is missing or does not answer; each with what to do about it.
-    pub fn start(config: Config, options: &Options) -> Result<Self, EndpointError> {
+    pub fn start(config: Config, options: &Options) -> Result<Self, PeerError> {
         let image = match &options.image {
             Some(image) => image.clone(),
             None => build(IMAGE)?,
@@ -93,16 +98,20 @@ impl Qemu {
             channel: options.channel,
             config,
         };
-        Ok(Self {
-            twin: InProcess::new(config),
-            expected: Vec::new(),
-            board: Board::start(&image, &setup, options.count.is_some())?,
+        let mut sent = Vec::new();
+        let mut qemu = Self {
+            twin: Twin::new(config),
+            board: Board::start(&image, &setup, options.count.is_some(), &mut sent)?,
+            sent,
             image,
-            period_ns: setup.period_ns(),
+            channel: Some(options.channel),
             last_stop: None,
-            clock: (setup.channel == Channel::Uart).then(|| SampleClock::new(setup.period_ns())),
             count: options.count.clone(),
-        })
+        };
+        // So every run begins, wherever the controller is.
+        qemu.reset(peers::reset())?;
+        qemu.last_stop = None;
+        Ok(qemu)
     }
 
     /// Has the image plant this fault into itself; only [`FAULTS_IMAGE`] does. Follows the board through its start, and
@@ -110,12 +119,18 @@ impl Qemu {
     ///
     /// # Errors
     /// The board does not start again.
-    pub fn plant(&mut self, fault: Fault) -> Result<(), EndpointError> {
+    pub fn plant(&mut self, fault: Fault) -> Result<(), PeerError> {
         self.board.tell(&Request::Plant(fault))?;
-        let stop = self.board.restart()?;
-        self.last_stop = Some(stop);
-        self.twin.restart(stop.reason);
+        let reason = self.follow_restart()?;
+        self.twin.restart(reason);
         Ok(())
+    }
+
+    /// Follows the board through its start; returns the reason.
+    fn follow_restart(&mut self) -> Result<ResetReason, PeerError> {
+        let stop = self.board.restart(&mut self.sent)?;
+        self.last_stop = Some(stop);
+        Ok(stop.reason)
     }
 
     /// How the board ended when it last started again in this run.
@@ -134,22 +149,79 @@ impl Qemu {
         log::decode(&image, &bytes)
     }
 
-    /// Hands over the frame that resets the board, and follows it through its start.
-    fn reset(&mut self, now: u64, frame: Option<CanFrame>) -> Result<(), EndpointError> {
-        match (&mut self.clock, frame) {
-            (Some(clock), Some(frame)) => {
-                self.board.send(&frame)?;
-                *clock = SampleClock::new(self.period_ns);
-            }
-            _ => self.board.tell(&Request::Poll { now, frame })?,
+    /// Calls the node on the board once, and has it counted.
+    fn ask(&mut self, frame: Option<&CanFrame>, planning: bool) -> Result<(), PeerError> {
+        let request = Request::Poll {
+            now: self.twin.controller().now(),
+            frame: frame.copied(),
+        };
+        let measured = self.board.ask(&request, &mut self.sent)?;
+        if let Some(count) = &self.count {
+            count.borrow_mut().polls.push(Poll {
+                instructions: board::instructions(measured.number),
+                phases: measured.phases.map(board::instructions),
+                received: frame.map(CanFrame::raw_id),
+                planning,
+            });
         }
-        self.last_stop = Some(self.board.restart()?);
         Ok(())
+    }
+
+    /// Hands over the frame that resets the board, and follows it through its start.
+    fn reset(&mut self, frame: CanFrame) -> Result<(), PeerError> {
+        self.sent.clear();
+        match self.channel {
+            Some(Channel::Uart) => self.board.send(&frame)?,
+            _ => self.board.tell(&Request::Poll {
+                now: self.twin.controller().now(),
+                frame: Some(frame),
+            })?,
+        }
+        self.follow_restart().map(drop)
+    }
+
+    /// Has board and twin do the same; what the board sends is in `sent`.
+    fn call(&mut self, now: Instant, received: Option<&CanFrame>) -> Result<(), PeerError> {
+        let before = self.twin.controller().now();
+        let planning = |twin: &Twin| twin.node().controller().is_planning();
+        let was_planning = planning(&self.twin);
+        self.twin.call(now, received);
+        if let (Some(frame), true) = (received, self.twin.controller().is_new()) {
+            return self.reset(*frame);
+        }
+        match (self.channel, received) {
+            // On the UART the board starts when the bus is opened, and its time is that of the frames.
+            (Some(Channel::Uart), None) => {}
+            (Some(Channel::Uart), Some(frame)) => self.board.exchange(frame, &mut self.sent)?,
+            (_, received) => {
+                // As the twin does when a frame has moved time on.
+                if received.is_some() && self.twin.controller().now() > before {
+                    self.ask(None, false)?;
+                }
+                self.ask(received, was_planning || planning(&self.twin))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Holds what the board has sent against the twin.
+    fn compare(&mut self, now: Instant) -> Result<(), PeerError> {
+        let differs = |difference: Difference| {
+            failure(format!(
+                "differs from this process at {:.6} s: {difference}",
+                now.seconds()
+            ))
+        };
+        for frame in &self.sent {
+            self.twin.compare(frame).map_err(differs)?;
+        }
+        let missing = self.twin.due().front();
+        Difference::between(missing, None).map_or(Ok(()), |missing| Err(differs(missing)))
     }
 
     /// What the board can tell only at the very end: bytes lost, and the stack when the deepest path has been taken.
     fn say_goodbye(&mut self) {
-        if self.clock.take().is_some()
+        if self.channel.take() == Some(Channel::Uart)
             && let Ok(lost @ 1..) = self.board.close_bus()
         {
             eprintln!("plant-sim: the controller in QEMU has lost {lost} bytes on its UART");
@@ -162,54 +234,27 @@ impl Qemu {
     }
 }
 
-impl Endpoint for Qemu {
-    fn poll(
-        &mut self,
-        now: u64,
-        received: Option<&CanFrame>,
-        sent: &mut Vec<CanFrame>,
-    ) -> Result<(), EndpointError> {
-        let first = sent.len();
-        let mut now = now;
-        let frame = received.copied();
-        match (&mut self.clock, received) {
-            (None, _) => {}
-            (Some(clock), Some(frame)) => {
-                clock.observe(frame);
-                now = clock.now();
-            }
-            // Without a frame there is nothing that the UART could tell the board.
-            (Some(_), None) => return Ok(()),
-        }
-        let planning = self.twin.node().controller().is_planning();
-        self.expected.clear();
-        self.twin.poll(now, received, &mut self.expected)?;
-        if self.twin.node().reset_asked() {
-            return self.reset(now, frame);
-        }
-        let measured = match received {
-            Some(frame) if self.clock.is_some() => {
-                self.board.exchange(frame, sent)?;
-                Measured::default()
-            }
-            _ => self.board.ask(&Request::Poll { now, frame }, sent)?,
-        };
-        if let Some(what) = difference::first(&self.expected, &sent[first..], now) {
-            return Err(failure(what));
-        }
-        if let Some(count) = &self.count {
-            count.borrow_mut().polls.push(Poll {
-                instructions: board::instructions(measured.number),
-                phases: measured.phases.map(board::instructions),
-                received: received.map(CanFrame::raw_id),
-                planning: planning || self.twin.node().controller().is_planning(),
-            });
-        }
-        Ok(())
+impl Peer for Qemu {
+    fn wake(&self) -> Option<Instant> {
+        let twin = self.twin.controller();
+        (twin.is_new() || self.channel == Some(Channel::Fifo)).then(|| twin.due())
     }
 
-    fn node(&self) -> &Node {
-        self.twin.node()
+    fn poll(
+        &mut self,
+        now: Instant,
+        received: Option<&CanFrame>,
+        world: &mut World,
+        out: &mut Outbox,
+    ) -> Result<(), PeerError> {
+        self.call(now, received)?;
+        // A board that has been reset over the UART has said its first words, the twin has yet to be called for them.
+        if !self.twin.controller().is_new() {
+            self.compare(now)?;
+            out.extend(self.sent.drain(..).map(|frame| (now + COMPUTE, frame)));
+        }
+        world.mind = Mind::of(self.twin.node());
+        Ok(())
     }
 }
 
@@ -219,8 +264,8 @@ impl Drop for Qemu {
     }
 }
 
-fn failure(what: impl Into<String>) -> EndpointError {
-    EndpointError {
+fn failure(what: impl Into<String>) -> PeerError {
+    PeerError {
         who: "in QEMU".into(),
         what: what.into(),
     }

@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use firmware::control::controller::Config;
 use serde::Serialize;
-use sim::endpoint::{Endpoint, EndpointError, InProcess};
+use sim::controller::InProcess;
+use sim::observer::{Observer, Pace};
+use sim::peer::{Peer, PeerError};
 use sim::record::{TraceLog, TruthLog};
 use sim::run::{Failure, with_controller};
 use sim::setup::{RunConfig, SetupError};
@@ -22,7 +24,7 @@ pub enum ExecuteError {
     Setup(#[from] SetupError),
     /// The controller could not be started.
     #[error(transparent)]
-    Controller(#[from] EndpointError),
+    Controller(#[from] PeerError),
     /// Files cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -57,33 +59,44 @@ impl Results {
 /// # Errors
 /// Nothing was run, or nothing could be written; see [`ExecuteError`].
 pub fn execute(config: &RunConfig, out: &Path) -> Result<Results, ExecuteError> {
-    execute_with(config, out, |config| Ok(InProcess::new(config)))
+    execute_with(
+        config,
+        out,
+        |config| Ok(InProcess::new(config)),
+        &mut (),
+        (),
+    )
 }
 
-/// Runs a scenario as [`execute`] does, with the controller that `connect` starts.
+/// Runs a scenario as [`execute`] does, with the controller that `connect` starts, as fast as `pace` lets it, and in
+/// sight of one more observer.
 ///
 /// # Errors
 /// As [`execute`], and [`ExecuteError::Controller`] when `connect` fails.
-pub fn execute_with<E: Endpoint>(
+pub fn execute_with<C: Peer, P: Pace, O: Observer>(
     config: &RunConfig,
     out: &Path,
-    connect: impl FnOnce(Config) -> Result<E, EndpointError>,
+    connect: impl FnOnce(Config) -> Result<C, PeerError>,
+    pace: &mut P,
+    observer: O,
 ) -> Result<Results, ExecuteError> {
     let folder = Folder::open(out)?;
     let failed = |source| folder.failed(source);
     let truth = TruthLog::new(folder.create("truth.csv")?).map_err(failed)?;
     let mut observers = (
         TraceLog::new(folder.create("trace.log")?),
-        (truth, Progress::new(config.scenario.cycles)),
+        (truth, (Progress::new(config.scenario.cycles), observer)),
     );
 
     let began = Instant::now();
     let summary =
-        with_controller(config, connect, &mut observers).map_err(|failure| match failure {
-            Failure::Setup(error) => ExecuteError::from(error),
-            Failure::Controller(error) => error.into(),
-            Failure::Output(source) => failed(source).into(),
-        })?;
+        with_controller(config, connect, pace, &mut observers).map_err(
+            |failure| match failure {
+                Failure::Setup(error) => ExecuteError::from(error),
+                Failure::Controller(error) => error.into(),
+                Failure::Output(source) => failed(source).into(),
+            },
+        )?;
     let wall_time_s = began.elapsed().as_secs_f64();
 
     let (trace, (truth, _)) = observers;

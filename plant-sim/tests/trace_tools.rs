@@ -5,13 +5,14 @@ use std::sync::LazyLock;
 use firmware::mechanics::arm::IRB_930;
 use plant_sim::check::{Checker, Offence};
 use plant_sim::plot::Plot;
-use plant_sim::replay::{Difference, Replay};
+use plant_sim::replay::Replay;
 use plant_sim::run::execute;
 use protocol::codec::{self, DecodeError};
 use protocol::e2e::Verdict;
 use protocol::frame::{CanFrame, StandardId};
 use protocol::messages::{Command, ControlWord, DriveStatus, Feedback, Message};
 use protocol::table;
+use protocol::time::Period;
 use protocol::wire::{BitTiming, FrameBits};
 use sim::model::RobotModel;
 use sim::rig::RigConfig;
@@ -19,6 +20,7 @@ use sim::scenario::Scenario;
 use sim::setup::RunConfig;
 use sim::summary::Summary;
 use trace::decode::{Decoder, Format};
+use trace::difference::Difference;
 use trace::stats::{Gatherer, Statistics};
 use trace::{Entry, ErrorFrame, Interface, Reader, Record};
 
@@ -380,7 +382,11 @@ fn load_is_the_time_of_the_frames() {
     let records = good();
     let busy: u64 = records
         .iter()
-        .map(|record| BitTiming::default().duration(FrameBits::exact(&frame_of(record))))
+        .map(|record| {
+            BitTiming::default()
+                .duration(FrameBits::exact(&frame_of(record)))
+                .nanos()
+        })
         .sum();
     let statistics = statistics(&records);
     assert_eq!(statistics.load, busy as f64 / 9_200_000.0);
@@ -406,7 +412,7 @@ fn replay(records: &[Record]) -> Result<u64, Difference> {
     let config = RigConfig {
         nominal: (&model).into(),
         actual: model,
-        rate_hz: 1000.0,
+        period: Period::of_rate(1000.0),
         start: [0.0; 4],
         timing: BitTiming::default(),
     };
@@ -460,23 +466,22 @@ fn replay_names_sample_and_field() {
     assert_eq!(
         replay(&records),
         Err(Difference::Field {
-            sample: command.sample,
+            due: frame_of(&RUN.0[at]),
             field: "torque_lift".into(),
-            recorded: command.torque[2].to_string(),
-            replayed: original.to_string(),
+            expected: original.to_string(),
+            found: command.torque[2].to_string(),
         })
     );
 
     records[at].entry = RUN.0[at].entry;
     records.insert(at, records[at]);
-    let sample = command.sample;
     assert!(
-        matches!(replay(&records), Err(Difference::Surplus { frame }) if frame == frame_of(&records[at]))
+        matches!(replay(&records), Err(Difference::Surplus { found }) if found == frame_of(&records[at]))
     );
     records.remove(at);
     records.retain(|record| !is_command(record));
-    assert_eq!(replay(&records), Err(Difference::Missing { sample: 0 }));
-    assert!(sample > 0);
+    let first = frame_of(RUN.0.iter().find(|record| is_command(record)).unwrap());
+    assert_eq!(replay(&records), Err(Difference::Missing { due: first }));
 }
 
 /// Every mode of the run and every axis is in the picture; an emergency stop is marked.

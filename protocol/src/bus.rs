@@ -1,16 +1,11 @@
-//! The one door between a node and its CAN controller.
+//! The door between a node and its CAN controller. Frames are pushed in, with the time; what the node sends goes out here.
 
 use core::fmt;
 
 use crate::frame::CanFrame;
 
-/// A CAN controller with its queues: built-in bus, vcan, serial adapter or silicon.
-///
-/// No call blocks, and none reads a clock. Tracing and fault injection are wrappers that implement this trait again.
-pub trait Bus {
-    /// The oldest frame received and not yet taken, or `None`. A node's own frames are not received.
-    fn receive(&mut self) -> Option<CanFrame>;
-
+/// The transmit side of a CAN controller. No call blocks, and none reads a clock.
+pub trait Transmit {
     /// Puts a frame into the transmit queue.
     ///
     /// `Ok` says that the controller took the frame, not that any node received it: CAN tells a sender only that
@@ -19,6 +14,19 @@ pub trait Bus {
     /// # Errors
     /// The frame was not taken and is not sent later; see [`TransmitError`].
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError>;
+}
+
+/// A transmit side in a line of code.
+impl<F: FnMut(&CanFrame) -> Result<(), TransmitError>> Transmit for F {
+    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        self(frame)
+    }
+}
+
+/// A CAN controller with its queues: vcan, serial adapter or silicon.
+pub trait Bus: Transmit {
+    /// The oldest frame received and not yet taken, or `None`. A node's own frames are not received.
+    fn receive(&mut self) -> Option<CanFrame>;
 }
 
 /// Why a frame was not taken for transmission.

@@ -9,6 +9,8 @@
 //! The two messages of every sample go past postcard: they are packed without padding, so that each body that can be
 //! read has one form anyway.
 
+mod encoder;
+
 use core::fmt;
 
 use serde::{Serialize, de::DeserializeOwned};
@@ -18,6 +20,8 @@ use crate::messages::{EStop, EStopReason, Message};
 use crate::packed::Packed;
 use crate::schema::{Content, Kind, MessageInfo};
 use crate::table;
+
+pub use encoder::Encoder;
 
 /// A message as it came, with its end-to-end counter if it carries one.
 #[derive(Clone, Copy, Debug, PartialEq)]

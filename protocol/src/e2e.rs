@@ -123,6 +123,21 @@ const fn remainder_16(a: u32) -> u32 {
     (q ^ q << 5 ^ q << 12) & 0xFFFF
 }
 
+/// Counts the frames that go out under one identifier.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sender(u8);
+
+impl Sender {
+    /// Counter of the next frame; [`Profile::protect`] reduces it to its width.
+    #[must_use]
+    pub const fn next(&mut self) -> u8 {
+        let counter = self.0;
+        self.0 = counter.wrapping_add(1);
+        counter
+    }
+}
+
 /// What the counter of a received frame says about its place in the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

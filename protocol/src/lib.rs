@@ -29,4 +29,5 @@ pub mod schema;
 mod signals;
 pub mod slcan;
 pub mod table;
+pub mod time;
 pub mod wire;

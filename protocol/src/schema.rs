@@ -1,7 +1,7 @@
 //! How a message is described.
 
 use crate::e2e::Profile;
-use crate::frame::CanFrame;
+use crate::frame::{CanFrame, FrameKind, StandardId};
 use crate::messages::{Node, Server};
 
 /// Type and meaning of the bytes of a signal. All are little-endian.
@@ -132,6 +132,23 @@ impl MessageInfo {
     #[must_use]
     pub fn identifies(&self, frame: &CanFrame) -> bool {
         !frame.is_extended() && frame.raw_id() == u32::from(self.id)
+    }
+
+    /// A frame of this message with about half of the stuff bits there can be: alternating bits need none, equal ones
+    /// the most. `None` if no frame has the message's length.
+    #[must_use]
+    pub fn specimen(&self) -> Option<CanFrame> {
+        let kind = if self.is_fd() {
+            FrameKind::Fd {
+                brs: true,
+                esi: false,
+            }
+        } else {
+            FrameKind::Classical { remote: false }
+        };
+        let mut frame = CanFrame::zeroed(StandardId::new(self.id)?, kind, self.len)?;
+        frame.data_mut().fill(0x0F);
+        Some(frame)
     }
 
     /// Bytes before the protection: signals and padding.

@@ -8,6 +8,8 @@
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::Message;
+use protocol::table;
+use protocol::time::{Duration, Instant, Period};
 
 /// Most samples that one feedback frame may move the clock on, 1000 s at 1 kHz: more is not a gap but another run.
 const MAX_STEP: u32 = 1_000_000;
@@ -15,43 +17,51 @@ const MAX_STEP: u32 = 1_000_000;
 /// The clock of a controller in lock-step.
 #[derive(Clone, Copy, Debug)]
 pub struct SampleClock {
-    period_ns: u64,
-    now_ns: u64,
-    sample: Option<u32>,
+    period: Period,
+    now: Instant,
+    /// Number of the newest sample, and when it came.
+    newest: Option<(u32, Instant)>,
 }
 
 impl SampleClock {
-    /// A clock at 0 for samples every `period_ns` ns.
-    pub const fn new(period_ns: u64) -> Self {
+    /// A clock at the origin for samples every `period`.
+    pub const fn new(period: Period) -> Self {
         Self {
-            period_ns,
-            now_ns: 0,
-            sample: None,
+            period,
+            now: Instant::ORIGIN,
+            newest: None,
         }
     }
 
-    /// Present time, us: what [`Node::poll`](crate::node::Node::poll) takes.
-    pub const fn now(&self) -> u64 {
-        self.now_ns / 1000
+    /// Present time: what [`Node::poll`](crate::node::Node::poll) takes.
+    pub const fn now(&self) -> Instant {
+        self.now
     }
 
-    /// Looks at a frame that has just come, before the node does. A feedback frame that is older than the last, or from
-    /// drives that have started again, does not turn the clock back.
-    pub fn observe(&mut self, frame: &CanFrame) {
-        if let Ok(received) = codec::decode(frame)
+    /// Looks at a frame that has just come, before the node does; `true` if it has moved time on. The node is then called
+    /// without the frame first, for what has become due: no call is long for both. A feedback frame that is older than the
+    /// last, or from drives that have started again, does not turn the clock back.
+    pub fn observe(&mut self, frame: &CanFrame) -> bool {
+        let before = self.now;
+        if table::FEEDBACK.identifies(frame)
+            && let Ok(received) = codec::decode(frame)
             && let Message::Feedback(feedback) = received.message
         {
-            let last = self.sample.replace(feedback.sample);
-            let step = last.map_or(0, |last| feedback.sample.wrapping_sub(last));
-            if step <= MAX_STEP {
-                self.elapse(u64::from(step).saturating_mul(self.period_ns));
+            if let Some((last, at)) = self.newest {
+                let step = feedback.sample.wrapping_sub(last);
+                if step <= MAX_STEP {
+                    // What has elapsed without a sample since then is not counted twice.
+                    self.now = self.now.max(at + self.period.duration() * step);
+                }
             }
+            self.newest = Some((feedback.sample, self.now));
         }
+        self.now > before
     }
 
     /// Lets time pass without a sample: the drives are silent, and a watchdog must notice.
-    pub const fn elapse(&mut self, ns: u64) {
-        self.now_ns = self.now_ns.saturating_add(ns);
+    pub fn elapse(&mut self, time: Duration) {
+        self.now += time;
     }
 }
 
@@ -73,28 +83,40 @@ mod tests {
 
     #[test]
     fn time_is_the_number_of_samples_and_never_runs_backwards() {
-        let mut clock = SampleClock::new(1_000_000);
+        let mut clock = SampleClock::new(Period::of_rate(1000.0));
         // Sample seen, time expected in samples: gaps count, old samples and a restart do not.
         for (sample, expected) in [(7, 0), (8, 1), (11, 4), (10, 4), (12, 6), (0, 6), (1, 7)] {
             clock.observe(&feedback(sample));
-            assert_eq!(clock.now(), expected * 1000, "sample {sample}");
+            assert_eq!(
+                clock.now(),
+                Instant::from_micros(expected * 1000),
+                "sample {sample}"
+            );
         }
-        clock.elapse(2_500_000);
-        assert_eq!(clock.now(), 9_500);
+        clock.elapse(Duration::from_micros(2_500));
+        assert_eq!(clock.now(), Instant::from_micros(9_500));
         clock.observe(&feedback(u32::MAX));
         clock.observe(&feedback(0));
-        assert_eq!(clock.now(), 10_500, "sample numbers wrap");
+        assert_eq!(
+            clock.now(),
+            Instant::from_micros(10_500),
+            "sample numbers wrap"
+        );
+        // 2.5 ms of silence, and then the fourth sample since the last: 4 ms have passed, not 6.5.
+        clock.elapse(Duration::from_micros(2_500));
+        clock.observe(&feedback(4));
+        assert_eq!(clock.now(), Instant::from_micros(14_500));
     }
 
     #[test]
     fn other_frames_and_bad_feedback_do_not_move_it() {
-        let mut clock = SampleClock::new(1000);
+        let mut clock = SampleClock::new(Period::of_rate(1e6));
         clock.observe(&feedback(1));
         let mut bytes = [0; 48];
         bytes.copy_from_slice(feedback(2).data());
         bytes[0] ^= 1;
         let id = protocol::frame::StandardId::new(0x1C0).unwrap();
         clock.observe(&CanFrame::fd(id, &bytes, true).unwrap());
-        assert_eq!(clock.now(), 0);
+        assert_eq!(clock.now(), Instant::ORIGIN);
     }
 }

@@ -17,6 +17,7 @@ use protocol::messages::{
     Cause, Compensation, ControlWord, DriveStatus, Fault, Law, LimitFlags, Mode, MotionReply,
     MotionRequest, Outcome, Refusal,
 };
+use protocol::time::Period;
 use serde::{Deserialize, Serialize};
 
 use crate::control::fault::MAX_GAP_MS;
@@ -33,9 +34,9 @@ use crate::trajectory::Reference;
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use requests::Answer;
 
-/// Time from a sample until its command acts, s: on the simulated bus the feedback takes 115 µs, computing 40 µs and the
-/// command 74 µs, and as much as another short frame may be in the way.
-const COMMAND_DELAY: f32 = 0.25e-3;
+/// Time from a sample until its command acts, s: two frames at the default bit timing, and the computing time. The
+/// simulator works it out from the message table and holds this one against it.
+const COMMAND_DELAY: f32 = 249.6e-6;
 /// Time that the brake is given, s: the simulated one opens within 50 ms and closes within 30 ms.
 const BRAKE_DELAY: f32 = 0.06;
 /// Steps of planning for each millisecond of the sampling period.
@@ -52,8 +53,8 @@ pub struct Config {
     pub payload: Payload,
     /// Control law at the start.
     pub selection: Selection,
-    /// Sampling period, s.
-    pub period: f32,
+    /// Sampling period.
+    pub period: Period,
     /// Time from a sample until its command acts at the drives, s.
     pub command_delay: f32,
     /// Time the brake takes to open or close, s.
@@ -63,15 +64,15 @@ pub struct Config {
 }
 
 impl Config {
-    /// Bench settings for `arm`: computed torque with observer, sampled every `period` seconds.
-    pub fn new(arm: ArmModel, period: f32) -> Self {
+    /// Bench settings for `arm`: computed torque with observer, sampled every `period`, on a bus of the default bit timing.
+    pub fn new(arm: ArmModel, period: Period) -> Self {
         Self {
             arm,
             payload: Payload::NONE,
             selection: Selection {
                 law: Law::ComputedTorqueJoint,
                 compensation: Compensation::Observer,
-                gains: Gains::for_period(period),
+                gains: Gains::for_period(period.seconds()),
             },
             period,
             command_delay: COMMAND_DELAY,
@@ -144,9 +145,9 @@ impl Controller {
             body: Body::new(&config.arm, &config.payload),
             config,
             state: State::SelfTest,
-            max_gap: ((MAX_GAP_MS as f32 * 1e-3 / config.period + 0.5) as u32).max(1),
+            max_gap: ((MAX_GAP_MS as f32 * 1e-3 / config.period.seconds() + 0.5) as u32).max(1),
             planning_steps: clamp(
-                config.period * 1e3 * PLANNING_STEPS_PER_MS + 0.5,
+                config.period.seconds() * 1e3 * PLANNING_STEPS_PER_MS + 0.5,
                 1.0,
                 MAX_PLANNING_STEPS,
             ) as u8,
@@ -282,10 +283,10 @@ impl Controller {
         }
         self.reference = self.advance(readings.steps.min(self.max_gap));
         let reference = &self.reference;
-        let lead = self.config.command_delay + 0.5 * self.config.period;
+        let period = self.config.period.seconds();
+        let lead = self.config.command_delay + 0.5 * period;
         self.error = reference.q - q;
 
-        let period = self.config.period;
         let motion = Motion {
             q,
             qd,

@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
 use firmware::mechanics::dynamics::drive::Drive;
-use firmware::node::Node;
+use firmware::node::{Node, PEER_TIMEOUT};
 use nalgebra::Vector4;
-use protocol::bus::{Bus, TransmitError};
+use protocol::bus::{Transmit, TransmitError};
 use protocol::codec::{decode, encode};
 use protocol::frame::CanFrame;
 use protocol::messages::{
@@ -15,21 +15,24 @@ use protocol::messages::{
     MotionRequest, Outcome, ParameterRequest, RefusalReason, ResetReason, Server,
 };
 use protocol::table;
+use protocol::time::{Duration, Instant, Period};
 
-pub const PERIOD_US: u64 = 1000;
+pub const PERIOD: Period = Period::of_rate(1000.0);
+/// Past any watchdog of the drives.
+pub const SILENCE: Duration = Duration::from_nanos(PEER_TIMEOUT.nanos() + 1_000);
 
 #[derive(Default)]
 pub struct Wire {
     pub to_node: VecDeque<CanFrame>,
     pub from_node: Vec<CanFrame>,
+    pub full: bool,
 }
 
-impl Bus for Wire {
-    fn receive(&mut self) -> Option<CanFrame> {
-        self.to_node.pop_front()
-    }
-
+impl Transmit for Wire {
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
+        if self.full {
+            return Err(TransmitError::QueueFull);
+        }
         self.from_node.push(*frame);
         Ok(())
     }
@@ -39,7 +42,7 @@ impl Bus for Wire {
 pub struct Bench {
     pub node: Node,
     pub wire: Wire,
-    pub now: u64,
+    pub now: Instant,
     pub sample: u32,
     pub feedback_counter: u8,
     pub motion_counter: u8,
@@ -48,20 +51,20 @@ pub struct Bench {
     pub velocity: [f32; 4],
     pub status: DriveStatus,
     pub follows: bool,
-    period_us: u64,
+    period: Duration,
     drive: Drive,
 }
 
 impl Bench {
     pub fn new() -> Self {
-        Self::with(Config::new(IRB_930, 1e-3))
+        Self::with(Config::new(IRB_930, PERIOD))
     }
 
     pub fn with(config: Config) -> Self {
         let mut bench = Self {
             node: Node::new(config, ResetReason::Watchdog),
             wire: Wire::default(),
-            now: 0,
+            now: Instant::ORIGIN,
             sample: 0,
             feedback_counter: 0,
             motion_counter: 0,
@@ -70,7 +73,7 @@ impl Bench {
             velocity: [0.0; 4],
             status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
             follows: false,
-            period_us: (config.period * 1e6).round() as u64,
+            period: config.period.duration(),
             drive: Drive::new(&IRB_930.drive),
         };
         bench.put(&Vector4::new(0.2, 1.5, 0.15, 0.3));
@@ -140,8 +143,16 @@ impl Bench {
         frame
     }
 
+    /// Hands over what has been put on the wire, frame by frame, or only the time.
     pub fn poll(&mut self) -> Vec<Message> {
-        self.node.poll(self.now, &mut self.wire);
+        let mut received = self.wire.to_node.pop_front();
+        loop {
+            self.node.poll(self.now, received.as_ref(), &mut self.wire);
+            received = self.wire.to_node.pop_front();
+            if received.is_none() {
+                break;
+            }
+        }
         self.wire
             .from_node
             .drain(..)
@@ -151,7 +162,7 @@ impl Bench {
 
     /// One sample with what has been put on the wire; returns what the node sent.
     pub fn step(&mut self) -> Vec<Message> {
-        self.now += self.period_us;
+        self.now += self.period;
         let frame = self.next_feedback();
         self.wire.to_node.push_back(frame);
         self.poll()
@@ -178,7 +189,7 @@ impl Bench {
     /// A sample that is lost on its way.
     pub fn lose(&mut self) {
         self.next_feedback();
-        self.now += self.period_us;
+        self.now += self.period;
     }
 
     /// Control words of the next samples.

@@ -3,7 +3,6 @@
 use firmware::control::controller::Config;
 use firmware::control::fault::{MAX_GAP_MS, REACTIONS};
 use firmware::mechanics::arm::IRB_930;
-use firmware::node::PEER_TIMEOUT_US;
 use nalgebra::Vector4;
 use protocol::e2e::Profile;
 use protocol::frame::CanFrame;
@@ -11,8 +10,9 @@ use protocol::messages::{
     Cause, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode, MotionRequest, Outcome,
     State,
 };
+use protocol::time::Period;
 
-use crate::bench::{Bench, estop, is_off};
+use crate::bench::{Bench, PERIOD, SILENCE, estop, is_off};
 
 fn emergencies(sent: &[Message]) -> Vec<Emergency> {
     sent.iter()
@@ -52,7 +52,7 @@ fn gaps_up_to_the_limit_are_ridden_out_and_longer_ones_stop_the_arm() {
 #[test]
 fn a_silent_peer_takes_the_torque_away_and_is_reported() {
     let mut bench = Bench::enabled();
-    bench.now += PEER_TIMEOUT_US + 1;
+    bench.now += SILENCE;
     let sent = bench.poll();
     assert_eq!(
         (bench.mode(), bench.node.controller().cause()),
@@ -126,7 +126,7 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
         Cause::SelfTest => {
             let mut arm = IRB_930;
             arm.payload_max = -1.0;
-            Bench::with(Config::new(arm, 1e-3))
+            Bench::with(Config::new(arm, PERIOD))
         }
         _ => Bench::enabled(),
     };
@@ -141,7 +141,7 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.step()
         }
         Cause::PeerSilent => {
-            bench.now += PEER_TIMEOUT_US + 1;
+            bench.now += SILENCE;
             bench.poll()
         }
         Cause::Reordered => {
@@ -240,7 +240,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
 #[test]
 fn a_gap_is_judged_by_its_time() {
     for (lost, expected) in [(9, Mode::Enabled), (10, Mode::FaultReaction)] {
-        let mut bench = Bench::with(Config::new(IRB_930, 0.5e-3));
+        let mut bench = Bench::with(Config::new(IRB_930, Period::of_rate(2000.0)));
         bench.enable();
         bench.run(100);
         assert_eq!(bench.mode(), Mode::Enabled);

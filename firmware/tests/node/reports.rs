@@ -1,7 +1,6 @@
 //! What the node says by itself, how much it does in one call, and what it ignores.
 
 use firmware::control::phase::{Phase, Probe};
-use firmware::node::FRAMES_PER_POLL;
 use proptest::prelude::*;
 use protocol::codec::encode;
 use protocol::frame::{CanFrame, StandardId};
@@ -9,18 +8,7 @@ use protocol::messages::{
     Message, Mode, MotionRequest, Nmt, NmtCommand, Node as Name, ResetReason, State,
 };
 
-use crate::bench::{Bench, PERIOD_US, estop};
-
-#[test]
-fn work_in_one_call_is_bounded() {
-    let mut bench = Bench::enabled();
-    let estops = 3 * FRAMES_PER_POLL;
-    for _ in 0..estops {
-        bench.wire.to_node.push_back(estop());
-    }
-    bench.poll();
-    assert_eq!(bench.wire.to_node.len(), estops - FRAMES_PER_POLL);
-}
+use crate::bench::{Bench, PERIOD, SILENCE};
 
 #[test]
 fn state_and_heartbeat_come_at_their_rates() {
@@ -84,7 +72,8 @@ fn a_node_asked_to_reset_says_so_and_nothing_more() {
         let mut bench = Bench::enabled();
         let nmt = Message::Nmt(Nmt { command, node });
         bench.wire.to_node.push_back(encode(&nmt, 0).unwrap());
-        let sent = bench.step();
+        bench.now += SILENCE;
+        let sent = bench.poll();
         assert_eq!(bench.node.reset_asked(), asked, "{command} {node}");
         assert_eq!(sent.is_empty(), asked, "{command} {node}: {sent:?}");
     }
@@ -132,17 +121,20 @@ impl Probe for Marks {
 fn every_phase_of_a_sample_is_marked_once_and_in_order() {
     let mut bench = Bench::enabled();
     let frame = bench.next_feedback();
-    bench.wire.to_node.push_back(frame);
     let mut marks = Marks::default();
-    bench.now += PERIOD_US;
-    bench.node.poll_with(bench.now, &mut bench.wire, &mut marks);
+    bench.now += PERIOD.duration();
+    bench
+        .node
+        .poll_with(bench.now, Some(&frame), &mut bench.wire, &mut marks);
     let mut expected = Phase::ALL.to_vec();
-    // After the sample the node has looked for more frames.
+    // What other frames would have taken.
     expected.insert(Phase::ALL.len() - 1, Phase::Decode);
     assert_eq!(marks.0, expected);
 
     let mut marks = Marks::default();
-    bench.node.poll_with(bench.now, &mut bench.wire, &mut marks);
+    bench
+        .node
+        .poll_with(bench.now, None, &mut bench.wire, &mut marks);
     assert_eq!(marks.0, [Phase::Decode, Phase::Report]);
 }
 

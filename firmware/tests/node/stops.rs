@@ -4,7 +4,7 @@ use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
 use protocol::messages::{Cause, ControlWord, DriveStatus, FaultAxis, MotionRequest};
 
-use crate::bench::{Bench, estop, is_off};
+use crate::bench::{Bench, PERIOD, estop, is_off};
 use crate::faults::states;
 
 const OFF: ControlWord = ControlWord::EMPTY;
@@ -117,7 +117,7 @@ fn a_stop_that_is_followed_ends_at_rest() {
 
 #[test]
 fn a_law_without_a_finite_torque_takes_brake_and_torque_off() {
-    let mut config = Config::new(IRB_930, 1e-3);
+    let mut config = Config::new(IRB_930, PERIOD);
     config.selection.gains.bandwidth = f32::NAN;
     let mut bench = Bench::with(config);
     bench.hello(protocol::table::HASH);

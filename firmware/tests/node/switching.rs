@@ -1,10 +1,9 @@
 //! Switching on and off, and emergency stops.
 
-use firmware::node::PEER_TIMEOUT_US;
 use protocol::messages::{ControlWord, Message, Mode, MotionRequest, Outcome, RefusalReason};
 use protocol::table;
 
-use crate::bench::{Bench, estop, is_off};
+use crate::bench::{Bench, SILENCE, estop, is_off};
 
 #[test]
 fn switching_on_takes_a_known_peer_and_opens_the_brake_under_torque() {
@@ -154,7 +153,7 @@ fn a_peer_that_goes_silent_during_an_emergency_stop_leaves_no_torque() {
             .control_word()
             .contains(ControlWord::TORQUE_ENABLE)
     );
-    bench.now += PEER_TIMEOUT_US + 1;
+    bench.now += SILENCE;
     bench.poll();
     assert_eq!(bench.mode(), Mode::EStop);
     let word = bench.node.controller().control_word();

@@ -1,12 +1,12 @@
 //! A CAN bus in the bench: bit-timed, with arbitration, deterministic.
 //!
-//! Time is an argument, in ns from any origin. The bus never runs by itself: the caller puts frames in with
+//! Time is an argument. The bus never runs by itself: the caller puts frames in with
 //! [`BuiltinBus::enqueue`], asks with [`BuiltinBus::next_event`] when something happens, and takes what was received
 //! with [`BuiltinBus::pop_delivery`].
 //!
 //! What is modelled: exact frame lengths, arbitration bit by bit, non-preemption, interframe space, transmit mailboxes,
 //! identifier collisions. What is not: propagation delay, oscillator tolerance, error frames of other causes and error
-//! counters; faults are injected by wrappers around a node's [`Bus`](protocol::bus::Bus).
+//! counters; those of a node are injected by wrappers around its [`Peer`](crate::peer::Peer).
 
 mod load;
 
@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 
 use protocol::bus::TransmitError;
 use protocol::frame::{CanFrame, Id};
+use protocol::time::{Duration, Instant};
 use protocol::wire::{BitTiming, FrameBits, arbitration_field};
 
 pub use load::{MAX_LOAD, Overload, Traffic, admit, worst_case_load};
@@ -55,10 +56,10 @@ impl NodeSet {
 /// A frame that arrived at every node but its sender.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delivery {
-    /// When receivers took it as valid, ns: sample point of the last but one bit of end of frame.
-    pub time: u64,
-    /// When its start of frame began, ns.
-    pub start: u64,
+    /// When receivers took it as valid: sample point of the last but one bit of end of frame.
+    pub time: Instant,
+    /// When its start of frame began.
+    pub start: Instant,
     /// The frame.
     pub frame: CanFrame,
     /// The sender; several when nodes sent the very same frame at the same instant, which CAN merges into one.
@@ -72,8 +73,8 @@ pub struct Delivery {
 /// state to run in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Collision {
-    /// When the frames started, ns.
-    pub start: u64,
+    /// When the frames started.
+    pub start: Instant,
     /// Their identifier.
     pub id: Id,
     /// The nodes that sent them.
@@ -85,20 +86,20 @@ pub struct Collision {
 pub struct Carried {
     /// Frames received.
     pub frames: u64,
-    /// Time they took, interframe space included, ns.
-    pub busy: u64,
-    /// Longest that one waited from [`BuiltinBus::enqueue`] to its start of frame, ns.
-    pub max_wait: u64,
+    /// Time they took, interframe space included.
+    pub busy: Duration,
+    /// Longest that one waited from [`BuiltinBus::enqueue`] to its start of frame.
+    pub max_wait: Duration,
 }
 
 impl Carried {
-    /// Share of `elapsed` ns that the bus was taken, of 1.
+    /// Share of `elapsed` that the bus was taken, of 1.
     #[must_use]
-    pub fn load(&self, elapsed: u64) -> f64 {
-        self.busy as f64 / elapsed.max(1) as f64
+    pub fn load(&self, elapsed: Duration) -> f64 {
+        self.busy.nanos() as f64 / elapsed.nanos().max(1) as f64
     }
 
-    fn add(&mut self, busy: u64, wait: u64) {
+    fn add(&mut self, busy: Duration, wait: Duration) {
         self.frames += 1;
         self.busy += busy;
         self.max_wait = self.max_wait.max(wait);
@@ -124,8 +125,8 @@ pub struct Statistics {
 struct Mailbox {
     arbitration: u32,
     frame: CanFrame,
-    queued: u64,
-    duration: u64,
+    queued: Instant,
+    duration: Duration,
 }
 
 /// A node's CAN controller, as the bus sees it.
@@ -137,7 +138,7 @@ struct Node {
 
 impl Node {
     /// The mailbox that takes part in an arbitration at `start`: highest priority first, oldest of one identifier.
-    fn candidate(&self, start: u64) -> Option<(usize, &Mailbox)> {
+    fn candidate(&self, start: Instant) -> Option<(usize, &Mailbox)> {
         self.mailboxes
             .iter()
             .enumerate()
@@ -148,9 +149,9 @@ impl Node {
 
 /// The next transmission, as far as it is known.
 struct Transmission {
-    start: u64,
-    valid: u64,
-    idle: u64,
+    start: Instant,
+    valid: Instant,
+    idle: Instant,
     from: NodeSet,
     collides: bool,
 }
@@ -164,7 +165,7 @@ pub struct BuiltinBus {
     timing: BitTiming,
     nodes: Vec<Node>,
     /// End of the last intermission: no frame starts before.
-    idle: u64,
+    idle: Instant,
     statistics: Statistics,
 }
 
@@ -178,7 +179,7 @@ impl BuiltinBus {
         Self {
             timing,
             nodes: Vec::new(),
-            idle: 0,
+            idle: Instant::ORIGIN,
             statistics: Statistics::default(),
         }
     }
@@ -213,7 +214,7 @@ impl BuiltinBus {
     pub fn enqueue(
         &mut self,
         node: NodeId,
-        now: u64,
+        now: Instant,
         frame: &CanFrame,
     ) -> Result<(), TransmitError> {
         let node = &mut self.nodes[node.0];
@@ -230,17 +231,17 @@ impl BuiltinBus {
         Ok(())
     }
 
-    /// When the transmission that is under way or comes next ends, ns, unless frames put in by then win over it; `None`
+    /// When the transmission that is under way or comes next ends, unless frames put in by then win over it; `None`
     /// when nothing is to be sent.
     #[must_use]
-    pub fn next_event(&self) -> Option<u64> {
+    pub fn next_event(&self) -> Option<Instant> {
         self.next_transmission().map(|next| next.valid)
     }
 
     /// The oldest frame received at or before `until` and not yet taken.
     ///
     /// The caller says with it that nothing more is put in before `until`.
-    pub fn pop_delivery(&mut self, until: u64) -> Option<Delivery> {
+    pub fn pop_delivery(&mut self, until: Instant) -> Option<Delivery> {
         // Every round empties a mailbox.
         loop {
             let next = self.next_transmission()?;
@@ -281,7 +282,7 @@ impl BuiltinBus {
 
         let mut from = NodeSet::default();
         let mut collides = false;
-        let mut duration = 0;
+        let mut duration = Duration::ZERO;
         for (index, mailbox) in
             candidates().filter(|(_, mailbox)| mailbox.arbitration == winner.arbitration)
         {
@@ -296,7 +297,7 @@ impl BuiltinBus {
         let idle = start + duration;
         Some(Transmission {
             start,
-            valid: idle - self.timing.after_valid(),
+            valid: start + duration.saturating_sub(self.timing.after_valid()),
             idle,
             from,
             collides,
@@ -307,12 +308,12 @@ impl BuiltinBus {
     fn complete(&mut self, sent: &Transmission) -> Option<Delivery> {
         self.idle = sent.idle;
         let mut frame = None;
-        let mut wait = 0;
+        let mut wait = Duration::ZERO;
         for NodeId(index) in sent.from.iter() {
             let node = &mut self.nodes[index];
             let (mailbox, _) = node.candidate(sent.start)?;
             let mailbox = node.mailboxes.remove(mailbox);
-            wait = wait.max(sent.start - mailbox.queued);
+            wait = wait.max(sent.start.since(mailbox.queued));
             frame = Some(mailbox.frame);
         }
         let frame = frame?;
@@ -325,7 +326,7 @@ impl BuiltinBus {
             });
             return None;
         }
-        let busy = sent.idle - sent.start;
+        let busy = sent.idle.since(sent.start);
         self.statistics.total.add(busy, wait);
         self.statistics
             .by_id

@@ -5,13 +5,15 @@
 
 mod allowed;
 pub mod bus;
+pub mod controller;
 mod convert;
 pub mod drives;
-pub mod endpoint;
 mod maths;
 pub mod metrics;
 pub mod model;
+pub mod observer;
 pub mod operator;
+pub mod peer;
 pub mod plant;
 pub mod record;
 pub mod rig;

@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use crate::maths::square;
 use crate::model::RobotModel;
+use crate::observer::Truth;
 use crate::plant::arm::Arm;
-use crate::rig::Truth;
 
 /// Radius within which a cycle counts as ended, m.
 const COARSE: f64 = 1e-3;
@@ -162,30 +162,30 @@ impl Metrics {
     /// One sample.
     pub fn sample(&mut self, truth: &Truth) {
         let Some(cycle) = &mut self.cycle else { return };
-        let commanded = self.arm.pose(&self.arm.at(&truth.rq.into()));
-        let error = distance(&truth.tool, &[commanded.x, commanded.y, commanded.z]);
-        let moving = truth.rqd.iter().any(|qd| *qd != 0.0);
+        let commanded = self.arm.pose(&self.arm.at(&truth.mind.q.into()));
+        let error = distance(&truth.plant.tool, &[commanded.x, commanded.y, commanded.z]);
+        let moving = truth.mind.qd.iter().any(|qd| *qd != 0.0);
         if moving {
             if cycle.started.is_none() {
-                cycle.started = Some(cycle.previous.unwrap_or(truth.t));
+                cycle.started = Some(cycle.previous.unwrap_or(truth.plant.t));
             }
             self.squares += error * error;
             self.worst = self.worst.max(error);
             self.tracked += 1;
         } else if cycle.moving {
-            cycle.commanded_end = truth.t;
+            cycle.commanded_end = truth.plant.t;
         }
         cycle.moving = moving;
-        cycle.previous = Some(truth.t);
+        cycle.previous = Some(truth.plant.t);
 
         self.samples += 1;
         for axis in 0..4 {
-            let torque = truth.tau[axis].abs();
+            let torque = truth.plant.tau[axis].abs();
             self.peak_torque[axis] = self.peak_torque[axis].max(torque);
             self.torque_squares[axis] += torque * torque;
-            self.peak_speed[axis] = self.peak_speed[axis].max(truth.qd[axis].abs());
+            self.peak_speed[axis] = self.peak_speed[axis].max(truth.plant.qd[axis].abs());
         }
-        self.saturated_now = if truth.saturated {
+        self.saturated_now = if truth.plant.saturated {
             self.saturated_now + 1
         } else {
             0
@@ -245,7 +245,7 @@ impl Metrics {
 impl Cycle {
     /// Keeps the first instant from which on the tool stayed near the target.
     fn near(&mut self, truth: &Truth) {
-        self.distance = distance(&truth.tool, &self.target);
+        self.distance = distance(&truth.plant.tool, &self.target);
         for (radius, since) in [
             (COARSE, &mut self.coarse_since),
             (FINE, &mut self.fine_since),
@@ -253,7 +253,7 @@ impl Cycle {
             if self.distance > radius {
                 *since = None;
             } else if since.is_none() {
-                *since = Some(truth.t);
+                *since = Some(truth.plant.t);
             }
         }
     }

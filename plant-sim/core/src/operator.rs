@@ -2,39 +2,32 @@
 //!
 //! It knows the controller by its messages alone. Every wait has a limit and names who is late.
 
-use protocol::codec;
+mod program;
+
+use protocol::codec::{self, Encoder};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Hello, Message, Mode, Motion, MotionRequest, Outcome, ParameterReply, ParameterRequest,
-    Refusal, Server, State,
+    Cause, Fault, Hello, Message, Mode, Motion, MotionRequest, Node, Outcome, ParameterReply,
+    ParameterRequest, Refusal, Server, State,
 };
 use protocol::table;
+use protocol::time::{Duration, Instant, Period};
 
 use crate::model::Payload;
-use crate::scenario::{PayloadSpec, Scenario, Step};
+use crate::peer::{Outbox, Peer, PeerError, World};
+use crate::scenario::Scenario;
+use program::{Action, program};
 
-/// Longest wait for a reply, ns.
-const REPLY_LIMIT_NS: u64 = 2_000_000_000;
-/// Longest wait for a mode to change, ns.
-const MODE_LIMIT_NS: u64 = 2_000_000_000;
-/// Longest wait for a move to end, ns.
-const MOVE_LIMIT_NS: u64 = 120_000_000_000;
+/// Longest wait for a reply.
+const REPLY_LIMIT: Duration = Duration::from_secs(2);
+/// Longest wait for a mode to change.
+const MODE_LIMIT: Duration = Duration::from_secs(2);
+/// Longest wait for a move to end.
+const MOVE_LIMIT: Duration = Duration::from_secs(120);
+/// Time without any frame after which the controller counts as silent: ten heartbeats.
+const SILENCE_LIMIT: Duration = Duration::from_secs(1);
 
-/// One thing to do.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Action {
-    Hello,
-    Request(MotionRequest),
-    WaitMode(Mode),
-    WaitArrived,
-    Dwell(u64),
-    Attach(Payload),
-    Release,
-    BeginCycle,
-    EndCycle,
-}
-
-/// What the rig has to do for the operator.
+/// What the operator does by hand, and where a cycle begins and ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hand {
     /// Put this into the gripper.
@@ -59,12 +52,18 @@ pub enum OperatorError {
         refusal: Refusal,
     },
     /// Nothing came in time.
-    #[error("the controller is late: {what} did not come within {seconds:.1} s")]
+    #[error("the controller is late: {what} did not come within {:.1} s", limit.seconds())]
     Late {
         /// What was waited for.
         what: String,
         /// For how long.
-        seconds: f64,
+        limit: Duration,
+    },
+    /// Nothing comes any more.
+    #[error("the controller is silent since {:.3} s", since.seconds())]
+    Silent {
+        /// When it was heard last.
+        since: Instant,
     },
     /// The peers were built from different message tables.
     #[error(
@@ -82,7 +81,7 @@ pub enum OperatorError {
         /// State it is in.
         mode: Mode,
         /// Latched fault.
-        fault: protocol::messages::Fault,
+        fault: Fault,
     },
 }
 
@@ -107,53 +106,67 @@ fn sentence(refusal: &Refusal) -> String {
 enum Progress {
     /// Not begun.
     Due,
-    /// Sent or begun at this time, ns.
-    Since(u64),
+    /// Sent or begun at this time.
+    Since(Instant),
 }
 
 /// The operator of one run.
+///
+/// Where something goes wrong it says so once, asks the controller to stop and to disable, and does no more.
 #[derive(Clone, Debug)]
 pub struct Operator {
     actions: std::vec::IntoIter<Action>,
     current: Option<Action>,
     progress: Progress,
+    /// Between two looks at what has come, and the next of them.
+    period: Period,
+    next: Instant,
+    given_up: bool,
+    encoder: Encoder,
     sequence: u8,
-    motion_counter: u8,
-    parameter_counter: u8,
     reply: Option<Outcome>,
     greeted: Option<Hello>,
     state: Option<State>,
+    /// The controller has reported a fault that is not cleared.
+    alarmed: bool,
+    /// When the controller was heard last.
+    heard: Instant,
     /// Number of the last move that was accepted.
     last_move: Option<u8>,
 }
 
 impl Operator {
-    /// An operator who will run `scenario`.
+    /// An operator that runs `scenario`.
     pub fn new(scenario: &Scenario) -> Self {
-        let actions = program(scenario).into_iter();
-        let mut operator = Self {
+        let mut actions = program(scenario).into_iter();
+        Self {
+            current: actions.next(),
             actions,
-            current: None,
             progress: Progress::Due,
+            period: Period::of_rate(scenario.rate_hz),
+            next: Instant::ORIGIN,
+            given_up: false,
+            encoder: Encoder::default(),
             sequence: 0,
-            motion_counter: 0,
-            parameter_counter: 0,
             reply: None,
             greeted: None,
             state: None,
+            alarmed: false,
+            heard: Instant::ORIGIN,
             last_move: None,
-        };
-        operator.current = operator.actions.next();
-        operator
-    }
-
-    /// Whether everything has been done.
-    pub fn is_done(&self) -> bool {
-        self.current.is_none()
+        }
     }
 
     /// Takes a frame that has just arrived.
-    pub fn receive(&mut self, frame: &CanFrame) {
+    fn receive(&mut self, now: Instant, frame: &CanFrame) {
+        if table::of_frame(frame).is_none_or(|info| info.sender != Some(Node::Controller)) {
+            return;
+        }
+        self.heard = now;
+        // A command is nothing to an operator.
+        if table::COMMAND.identifies(frame) {
+            return;
+        }
         let Ok(received) = codec::decode(frame) else {
             return;
         };
@@ -165,98 +178,122 @@ impl Operator {
                 self.greeted = Some(hello);
             }
             Message::State(state) => self.state = Some(state),
+            Message::Emergency(_, emergency) => self.alarmed = emergency.cause != Cause::None,
             _ => {}
         }
     }
 
-    /// One sample of the operator's work, at `now` ns: at most one frame to send and what there
-    /// is to do by hand.
-    ///
-    /// # Errors
-    /// The run cannot go on; see [`OperatorError`].
-    pub fn step(&mut self, now: u64) -> Result<(Option<CanFrame>, Option<Hand>), OperatorError> {
-        self.watch()?;
-        // Things that take no time are done in the same sample.
+    /// One look at what has come, and what follows from it.
+    fn step(&mut self, now: Instant, world: &mut World, out: &mut Outbox) {
+        match self.work(now, world, out) {
+            Ok(true) => {
+                // An operator that has given up has said so.
+                world.outcome = (!self.given_up).then_some(Ok(()));
+            }
+            Ok(false) => {}
+            Err(_) if self.given_up => self.stop_working(vec![]),
+            Err(error) => {
+                world.outcome = Some(Err(error));
+                self.given_up = true;
+                self.stop_working(vec![
+                    Action::Request(MotionRequest::Stop),
+                    Action::Request(MotionRequest::Disable),
+                ]);
+            }
+        }
+    }
+
+    fn stop_working(&mut self, last: Vec<Action>) {
+        self.actions = last.into_iter();
+        self.current = self.actions.next();
+        self.progress = Progress::Due;
+    }
+
+    /// Goes on with the present action, and with all that take no time; `true` when nothing is left to do.
+    fn work(
+        &mut self,
+        now: Instant,
+        world: &mut World,
+        out: &mut Outbox,
+    ) -> Result<bool, OperatorError> {
+        if !self.given_up {
+            self.watch(now)?;
+        }
         loop {
             let Some(action) = self.current else {
-                return Ok((None, None));
+                return Ok(true);
             };
             let begun = match self.progress {
                 Progress::Due => {
                     self.progress = Progress::Since(now);
                     if let Some(frame) = self.begin(&action) {
-                        return Ok((Some(frame), None));
+                        out.push((now, frame));
+                        return Ok(false);
                     }
                     now
                 }
                 Progress::Since(begun) => begun,
             };
-            if !self.is_complete(&action, now - begun)? {
-                return Ok((None, None));
+            if !self.is_complete(&action, now.since(begun))? {
+                return Ok(false);
             }
             self.progress = Progress::Due;
             self.current = self.actions.next();
-            let hand = match action {
-                Action::Attach(payload) => Hand::Attach(payload),
-                Action::Release => Hand::Release,
-                Action::BeginCycle => Hand::BeginCycle,
-                Action::EndCycle => Hand::EndCycle,
-                _ => continue,
-            };
-            return Ok((None, Some(hand)));
+            if let Action::Hand(hand) = action {
+                match hand {
+                    Hand::Attach(payload) => world.plant.attach(payload),
+                    Hand::Release => world.plant.release(),
+                    Hand::BeginCycle | Hand::EndCycle => {}
+                }
+                world.hands.push(hand);
+                return Ok(false);
+            }
         }
     }
 
-    /// A controller that has stopped by itself ends the run.
-    fn watch(&self) -> Result<(), OperatorError> {
-        match self.state {
-            Some(state)
-                if matches!(state.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop) =>
-            {
-                Err(OperatorError::Stopped {
-                    mode: state.mode,
-                    fault: state.fault(),
-                })
-            }
-            _ => Ok(()),
+    /// A controller that has stopped by itself, or is no longer heard, ends the run.
+    fn watch(&self, now: Instant) -> Result<(), OperatorError> {
+        if let Some(state) = self.state
+            && matches!(state.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop)
+        {
+            return Err(OperatorError::Stopped {
+                mode: state.mode,
+                fault: state.fault(),
+            });
         }
+        if now.since(self.heard) > SILENCE_LIMIT {
+            return Err(OperatorError::Silent { since: self.heard });
+        }
+        Ok(())
     }
 
     fn begin(&mut self, action: &Action) -> Option<CanFrame> {
-        let (message, counter) = match action {
+        let message = match action {
             Action::Hello => {
                 let hello = Hello {
                     schema: table::HASH,
                     build: 0,
                     profile: Hello::PROFILE_FD,
                 };
-                let counter = self.parameter_counter;
-                self.parameter_counter = counter.wrapping_add(1);
-                let request = ParameterRequest::Hello(hello);
-                (
-                    Message::ParameterRequest(Server::Controller, request),
-                    counter,
-                )
+                Message::ParameterRequest(Server::Controller, ParameterRequest::Hello(hello))
             }
             Action::Request(request) => {
                 self.reply = None;
                 self.sequence = self.sequence.wrapping_add(1);
-                let counter = self.motion_counter;
-                self.motion_counter = counter.wrapping_add(1);
-                let motion = Motion {
+                Message::Motion(Motion {
                     sequence: self.sequence,
                     request: *request,
-                };
-                (Message::Motion(motion), counter)
+                })
             }
             _ => return None,
         };
         // A value that no frame can carry stays unsent; the missing reply then names the request.
-        codec::encode(&message, counter).ok()
+        self.encoder.encode(&message).ok()
     }
 
-    fn is_complete(&mut self, action: &Action, waited: u64) -> Result<bool, OperatorError> {
-        let (complete, limit, what) = match action {
+    /// Whether the action has come to its end.
+    fn is_complete(&mut self, action: &Action, waited: Duration) -> Result<bool, OperatorError> {
+        let (complete, limit) = match action {
             Action::Hello => {
                 if let Some(hello) = self.greeted
                     && hello.schema != table::HASH
@@ -266,32 +303,34 @@ impl Operator {
                         ours: table::HASH,
                     });
                 }
-                (
-                    self.greeted.is_some(),
-                    REPLY_LIMIT_NS,
-                    "reply to hello".to_string(),
-                )
+                (self.greeted.is_some(), REPLY_LIMIT)
             }
             Action::Request(request) => {
-                if let Some(Outcome::Refused(refusal)) = self.reply {
-                    return Err(OperatorError::Refused {
-                        request: request.name(),
-                        refusal,
-                    });
+                match self.reply {
+                    // What is refused because of a fault is not what went wrong: the next state says what did.
+                    Some(Outcome::Refused(_)) if self.alarmed && waited <= REPLY_LIMIT => {
+                        return Ok(false);
+                    }
+                    Some(Outcome::Refused(refusal)) => {
+                        return Err(OperatorError::Refused {
+                            request: request.name(),
+                            refusal,
+                        });
+                    }
+                    Some(Outcome::Accepted) if request.is_move() => {
+                        self.last_move = Some(self.sequence);
+                    }
+                    _ if *request == MotionRequest::Stop => {
+                        // What was under way will never be completed.
+                        self.last_move = None;
+                    }
+                    _ => {}
                 }
-                if self.reply.is_some() && request.is_move() {
-                    self.last_move = Some(self.sequence);
-                } else if *request == MotionRequest::Stop {
-                    // What was under way will never be completed.
-                    self.last_move = None;
-                }
-                let what = format!("reply to request {} ({})", self.sequence, request.name());
-                (self.reply.is_some(), REPLY_LIMIT_NS, what)
+                (self.reply.is_some(), REPLY_LIMIT)
             }
             Action::WaitMode(mode) => (
                 self.state.is_some_and(|state| state.mode == *mode),
-                MODE_LIMIT_NS,
-                format!("state {mode}"),
+                MODE_LIMIT,
             ),
             Action::WaitArrived => (
                 self.state.is_some_and(|state| {
@@ -299,105 +338,53 @@ impl Operator {
                         && state.queue == 0
                         && self.last_move.is_none_or(|last| last == state.completed)
                 }),
-                MOVE_LIMIT_NS,
-                "end of the move".to_string(),
+                MOVE_LIMIT,
             ),
-            Action::Dwell(time) => (waited >= *time, u64::MAX, String::new()),
-            Action::Attach(_) | Action::Release | Action::BeginCycle | Action::EndCycle => {
-                (true, u64::MAX, String::new())
-            }
+            Action::Dwell(time) => (waited >= *time, Duration::MAX),
+            Action::Hand(_) => (true, Duration::MAX),
         };
         if !complete && waited > limit {
             return Err(OperatorError::Late {
-                what,
-                seconds: limit as f64 * 1e-9,
+                what: self.awaited(action),
+                limit,
             });
         }
         Ok(complete)
     }
+
+    /// What an action waits for, in words.
+    fn awaited(&self, action: &Action) -> String {
+        match action {
+            Action::Hello => "reply to hello".into(),
+            Action::Request(request) => {
+                format!("reply to request {} ({})", self.sequence, request.name())
+            }
+            Action::WaitMode(mode) => format!("state {mode}"),
+            Action::WaitArrived => "end of the move".into(),
+            Action::Dwell(_) | Action::Hand(_) => "end of a dwell".into(),
+        }
+    }
 }
 
-/// Everything to do, in order.
-fn program(scenario: &Scenario) -> Vec<Action> {
-    let announce = |payload: &PayloadSpec| {
-        Action::Request(MotionRequest::SetPayload {
-            mass: payload.mass as f32,
-            com: payload.com_flange_frame.map(|x| x as f32),
-            inertia: payload.inertia_com_diag.map(|x| x as f32),
-        })
-    };
-    let nothing = PayloadSpec {
-        mass: 0.0,
-        com_flange_frame: [0.0; 3],
-        inertia_com_diag: [0.0; 3],
-    };
-    let carried = |payload: &PayloadSpec| payload.scaled(scenario.mismatch.payload).into();
-    let mut actions = vec![
-        Action::Hello,
-        Action::WaitMode(Mode::Ready),
-        // The first request of an operator might be a replay and cannot switch anything on.
-        Action::Request(MotionRequest::Stop),
-        Action::Request(MotionRequest::SelectLaw {
-            law: scenario.law.law,
-            compensation: scenario.law.compensation,
-        }),
-    ];
-    if let Some(gains) = &scenario.gains {
-        actions.push(Action::Request(MotionRequest::SetGains {
-            bandwidth: gains.bandwidth as f32,
-            damping: gains.damping as f32,
-            observer: gains.observer as f32,
-        }));
+impl Peer for Operator {
+    fn wake(&self) -> Option<Instant> {
+        Some(self.next)
     }
-    if let Some(payload) = &scenario.payload {
-        actions.extend([Action::Attach(carried(payload)), announce(payload)]);
-    }
-    actions.extend([
-        Action::Request(MotionRequest::Enable),
-        Action::WaitMode(Mode::Enabled),
-        // Until brake and observer have come to rest.
-        Action::Dwell(100_000_000),
-    ]);
-    for _ in 0..scenario.cycles {
-        actions.push(Action::BeginCycle);
-        for step in &scenario.cycle {
-            match step {
-                Step::Jump(jump) => actions.push(Action::Request(MotionRequest::Jump {
-                    target: jump.to.map(|x| x as f32),
-                    top: jump.top as f32,
-                    clearance: jump.clearance as f32,
-                    speed: jump.speed as f32,
-                })),
-                Step::Line(line) => actions.push(Action::Request(MotionRequest::MoveLine {
-                    target: line.to.map(|x| x as f32),
-                    speed: line.speed as f32,
-                })),
-                Step::Joints(line) => actions.push(Action::Request(MotionRequest::MoveJoint {
-                    target: line.to.map(|x| x as f32),
-                    speed: line.speed as f32,
-                })),
-                Step::Dwell(seconds) => {
-                    actions.extend([Action::WaitArrived, Action::Dwell((seconds * 1e9) as u64)])
-                }
-                Step::Stop(seconds) => actions.extend([
-                    Action::Dwell((seconds * 1e9) as u64),
-                    Action::Request(MotionRequest::Stop),
-                ]),
-                Step::Pick(payload) => actions.extend([
-                    Action::WaitArrived,
-                    Action::Attach(carried(payload)),
-                    announce(payload),
-                ]),
-                Step::Place {} => {
-                    actions.extend([Action::WaitArrived, Action::Release, announce(&nothing)])
-                }
+
+    fn poll(
+        &mut self,
+        now: Instant,
+        received: Option<&CanFrame>,
+        world: &mut World,
+        out: &mut Outbox,
+    ) -> Result<(), PeerError> {
+        match received {
+            Some(frame) => self.receive(now, frame),
+            None => {
+                self.next = now + self.period.duration();
+                self.step(now, world, out);
             }
         }
-        actions.extend([Action::WaitArrived, Action::EndCycle]);
+        Ok(())
     }
-    actions.extend([
-        Action::Request(MotionRequest::Disable),
-        Action::WaitMode(Mode::Ready),
-    ]);
-    actions
 }

@@ -42,6 +42,7 @@ pub struct Plant {
     qd: Vector4<f64>,
     request: Vector4<f64>,
     torque_enabled: bool,
+    saturated: bool,
     now: u64,
     max_step: u64,
     ledger: Rates,
@@ -118,6 +119,7 @@ impl Plant {
             qd: Vector4::zeros(),
             request: Vector4::zeros(),
             torque_enabled: false,
+            saturated: false,
             now: 0,
             ledger: Rates::zeros(),
             latched: (0, Vector4::zeros()),
@@ -146,7 +148,14 @@ impl Plant {
         let given = self
             .drive
             .limited(&self.request, &self.drive.to_motor(&self.qd));
-        std::array::from_fn(|i| torque[i] != given[i])
+        let saturated = std::array::from_fn(|i| torque[i] != given[i]);
+        self.saturated = saturated.contains(&true);
+        saturated
+    }
+
+    /// Whether a motor was asked for more than it could give when it was last asked.
+    pub fn is_saturated(&self) -> bool {
+        self.saturated
     }
 
     /// Switches all motors on or off. The last request stays.

@@ -3,9 +3,10 @@
 use std::io::{self, Write};
 
 use protocol::frame::CanFrame;
+use protocol::time::Instant;
 use trace::{Interface, LogHash, Writer};
 
-use crate::rig::{Observer, Truth};
+use crate::observer::{Observer, Truth};
 
 /// Every frame, as `candump -L` writes it.
 pub struct TraceLog<W: Write>(Writer<W>);
@@ -26,8 +27,8 @@ impl<W: Write> TraceLog<W> {
 }
 
 impl<W: Write> Observer for TraceLog<W> {
-    fn frame(&mut self, time: u64, frame: &CanFrame) -> io::Result<()> {
-        self.0.frame(time / 1000, frame)
+    fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        self.0.frame(time.micros(), frame)
     }
 }
 
@@ -61,14 +62,14 @@ impl<W: Write> Observer for TruthLog<W> {
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         // A third of the run's time would go into the standard library's shortest digits.
         let mut digits = zmij::Buffer::new();
-        self.0.write_all(digits.format(truth.t).as_bytes())?;
+        self.0.write_all(digits.format(truth.plant.t).as_bytes())?;
         for group in [
-            &truth.q,
-            &truth.qd,
-            &truth.rq,
-            &truth.rqd,
-            &truth.tau,
-            &truth.tool,
+            &truth.plant.q,
+            &truth.plant.qd,
+            &truth.mind.q,
+            &truth.mind.qd,
+            &truth.plant.tau,
+            &truth.plant.tool,
         ] {
             for value in group {
                 self.0.write_all(b",")?;

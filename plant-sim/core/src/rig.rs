@@ -1,112 +1,34 @@
-//! Lock-step: plant, drives, bus, controller and operator on one time line.
+//! Lock-step: peers, their bus and the robot on one time line.
 //!
-//! The only place that knows both controller and plant. Time is an integer number of nanoseconds
-//! and moves from event to event: a sample, the end of a frame on the bus, the end of a node's
-//! computing time. A command therefore acts as late as it would on the wire, and the same inputs
-//! give the same bytes on every machine.
+//! Time moves from event to event: a peer that wakes, a frame that enters a transmit buffer, the end of a frame on the bus. A
+//! command therefore acts as late as it would on the wire, and the same inputs give the same bytes.
 
 use std::collections::VecDeque;
+use std::io;
 
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::ArmModel;
-use firmware::node::Node;
-use protocol::frame::{CanFrame, FD_MAX, StandardId};
-use protocol::messages::Mode;
+use protocol::frame::CanFrame;
 use protocol::schema::{MessageInfo, Rate};
 use protocol::table;
+use protocol::time::{Duration, Instant, Period};
 use protocol::wire::{BitTiming, FrameBits};
 
 use crate::bus::{BuiltinBus, Delivery, NodeId, Overload, Statistics, Traffic};
-use crate::drives::Drives;
-use crate::endpoint::{COMPUTE_NS, Endpoint, EndpointError};
+use crate::controller::COMPUTE;
 use crate::model::RobotModel;
-use crate::operator::{Hand, Operator, OperatorError};
+use crate::observer::{Mind, Observer, Pace, PlantState, Truth};
+use crate::operator::OperatorError;
+use crate::peer::{Outbox, Peer, PeerError, World};
 use crate::plant::Plant;
 
 /// Transmit mailboxes of a node: as many as an FDCAN or M_CAN has and more than it needs.
 const MAILBOXES: usize = 32;
 
-/// One sample as it truly was.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truth {
-    /// Time of the sample, s.
-    pub t: f64,
-    /// Joint positions of the plant.
-    pub q: [f64; 4],
-    /// Joint speeds of the plant.
-    pub qd: [f64; 4],
-    /// Reference of the controller for this sample: positions.
-    pub rq: [f64; 4],
-    /// Reference: speeds.
-    pub rqd: [f64; 4],
-    /// Efforts at the joints when the sample was taken.
-    pub tau: [f64; 4],
-    /// Flange: x, y, z, yaw.
-    pub tool: [f64; 4],
-    /// Whether a motor was at its limit.
-    pub saturated: bool,
-    /// State of the controller.
-    pub mode: Mode,
-}
-
-/// What is shown of a run as it goes. An observer looks at what it cares for; a pair of observers is one.
-pub trait Observer {
-    /// A frame was delivered at `time` ns.
-    ///
-    /// # Errors
-    /// Output failed; the run ends.
-    fn frame(&mut self, time: u64, frame: &CanFrame) -> std::io::Result<()> {
-        let _ = (time, frame);
-        Ok(())
-    }
-
-    /// A sample has been answered.
-    ///
-    /// # Errors
-    /// Output failed; the run ends.
-    fn sample(&mut self, truth: &Truth) -> std::io::Result<()> {
-        let _ = truth;
-        Ok(())
-    }
-
-    /// A cycle begins or ends.
-    fn hand(&mut self, hand: &Hand) {
-        let _ = hand;
-    }
-}
-
-impl Observer for () {}
-
-impl<O: Observer> Observer for &mut O {
-    fn frame(&mut self, time: u64, frame: &CanFrame) -> std::io::Result<()> {
-        (**self).frame(time, frame)
-    }
-
-    fn sample(&mut self, truth: &Truth) -> std::io::Result<()> {
-        (**self).sample(truth)
-    }
-
-    fn hand(&mut self, hand: &Hand) {
-        (**self).hand(hand);
-    }
-}
-
-impl<A: Observer, B: Observer> Observer for (A, B) {
-    fn frame(&mut self, time: u64, frame: &CanFrame) -> std::io::Result<()> {
-        self.0.frame(time, frame)?;
-        self.1.frame(time, frame)
-    }
-
-    fn sample(&mut self, truth: &Truth) -> std::io::Result<()> {
-        self.0.sample(truth)?;
-        self.1.sample(truth)
-    }
-
-    fn hand(&mut self, hand: &Hand) {
-        self.0.hand(hand);
-        self.1.hand(hand);
-    }
-}
+/// Longest time that a run goes on after its operator has given up, for the arm to come to rest.
+pub const STANDSTILL_LIMIT: Duration = Duration::from_secs(5);
+/// Joint speed below which an axis stands, rad/s and m/s.
+const STANDING: f64 = 1e-3;
 
 /// Why a run ended before its scenario.
 #[derive(Debug, thiserror::Error)]
@@ -116,13 +38,13 @@ pub enum RunError {
     Operator(#[from] OperatorError),
     /// Output failed.
     #[error("cannot write results: {0}")]
-    Output(#[from] std::io::Error),
-    /// The controller stopped answering.
-    #[error("the controller is late: no command for {0} samples")]
-    Silent(u64),
-    /// The controller's process or board failed.
+    Output(#[from] io::Error),
+    /// The run could not be held to its pace.
+    #[error("cannot keep the pace: {0}")]
+    Pace(io::Error),
+    /// A process or a board failed.
     #[error(transparent)]
-    Endpoint(#[from] EndpointError),
+    Peer(#[from] PeerError),
 }
 
 /// What a rig is made of.
@@ -132,57 +54,82 @@ pub struct RigConfig {
     pub actual: RobotModel,
     /// The robot as the controller knows it.
     pub nominal: ArmModel,
-    /// Control rate, Hz.
-    pub rate_hz: f64,
-    /// Joint positions at the start.
+    /// Time between two samples.
+    pub period: Period,
+    /// Joint positions at the start, rad and m.
     pub start: [f64; 4],
     /// Bits on the bus.
     pub timing: BitTiming,
 }
 
-/// Plant, drives, bus and controller of one run.
-pub struct Rig<E> {
-    plant: Plant,
-    drives: Drives,
+/// The robot, the bus, and the peers of one run.
+pub struct Rig<'p> {
+    world: World,
     bus: BuiltinBus,
-    drives_at: NodeId,
-    controller_at: NodeId,
-    operator_at: NodeId,
-    controller: E,
-    /// What the controller has just sent.
-    sent: Vec<CanFrame>,
-    /// Frames that the controller has computed and that enter the bus at this time.
-    computed: VecDeque<(u64, CanFrame)>,
-    period: u64,
+    seats: Vec<Seat<'p>>,
+    /// Node of frames that are put onto the bus from outside.
+    outside: NodeId,
+    /// Frames that enter the transmit buffer of their node later, by time.
+    pending: VecDeque<(Instant, NodeId, CanFrame)>,
+    /// What a call has sent, empty in between.
+    out: Outbox,
+    period: Period,
     sample: u64,
+    /// Time of the last event.
+    last: Instant,
     dropped: u64,
 }
 
-impl<E: Endpoint> Rig<E> {
-    /// A rig at rest at time 0.
-    pub fn new(config: &RigConfig, controller: E) -> Self {
-        let period = (1e9 / config.rate_hz).round() as u64;
-        let seconds = period as f64 * 1e-9;
+/// A peer and its CAN controller.
+struct Seat<'p> {
+    peer: Box<dyn Peer + 'p>,
+    node: NodeId,
+}
+
+/// What happens next.
+enum Event {
+    /// The oldest pending frame enters its transmit buffer.
+    Enqueue(NodeId, Instant, CanFrame),
+    /// A frame is received, unless it is lost by then.
+    Delivery(Option<Delivery>),
+    /// This peer wakes.
+    Wake(usize, Instant),
+}
+
+impl<'p> Rig<'p> {
+    /// A robot at rest at the origin of time, and a bus without peers.
+    pub fn new(config: &RigConfig) -> Self {
         let mut bus = BuiltinBus::new(config.timing);
         Self {
-            plant: Plant::new(&config.actual, config.start),
-            drives: Drives::new(&config.actual, seconds),
-            drives_at: bus.attach(MAILBOXES),
-            controller_at: bus.attach(MAILBOXES),
-            operator_at: bus.attach(MAILBOXES),
+            world: World {
+                plant: Plant::new(&config.actual, config.start),
+                mind: Mind::BLANK,
+                hands: Vec::new(),
+                outcome: None,
+            },
+            outside: bus.attach(MAILBOXES),
             bus,
-            controller,
-            sent: Vec::new(),
-            computed: VecDeque::new(),
-            period,
+            seats: Vec::new(),
+            pending: VecDeque::new(),
+            out: Outbox::new(),
+            period: config.period,
             sample: 0,
+            last: Instant::ORIGIN,
             dropped: 0,
         }
     }
 
-    /// Simulated time, s.
-    pub fn time(&self) -> f64 {
-        (self.sample * self.period) as f64 * 1e-9
+    /// Adds a peer to the bus. Peers that wake at one instant do so in the order they were added.
+    pub fn attach(&mut self, peer: impl Peer + 'p) {
+        self.seats.push(Seat {
+            peer: Box::new(peer),
+            node: self.bus.attach(MAILBOXES),
+        });
+    }
+
+    /// Time of the next sample.
+    pub fn now(&self) -> Instant {
+        self.period.sample(self.sample)
     }
 
     /// What the bus has carried.
@@ -190,19 +137,14 @@ impl<E: Endpoint> Rig<E> {
         self.bus.statistics()
     }
 
-    /// The drive side, for its counters.
-    pub fn drives(&self) -> &Drives {
-        &self.drives
+    /// The robot.
+    pub fn plant(&self) -> &Plant {
+        &self.world.plant
     }
 
-    /// The controller, or its twin.
-    pub fn node(&self) -> &Node {
-        self.controller.node()
-    }
-
-    /// The controller's end of the rig.
-    pub fn controller(&mut self) -> &mut E {
-        &mut self.controller
+    /// How the operator's work has ended, if it has.
+    pub fn outcome(&self) -> Option<&Result<(), OperatorError>> {
+        self.world.outcome.as_ref()
     }
 
     /// Frames that found a full transmit queue.
@@ -210,189 +152,158 @@ impl<E: Endpoint> Rig<E> {
         self.dropped
     }
 
-    /// Puts a frame of the operator's node onto the bus at the beginning of the next sample.
-    pub fn inject(&mut self, frame: &CanFrame) {
-        self.enqueue(self.operator_at, self.sample * self.period, frame);
+    /// Whether the arm stands still and its brake is closed.
+    pub fn is_at_rest(&self) -> bool {
+        let plant = &self.world.plant;
+        plant.brake().is_closed() && plant.qd().iter().all(|qd| qd.abs() < STANDING)
     }
 
-    /// Runs until the operator is done.
+    /// Puts a frame from outside onto the bus at the beginning of the next sample.
+    pub fn inject(&mut self, frame: &CanFrame) {
+        self.enqueue(self.outside, self.now(), frame);
+    }
+
+    /// Runs until the operator is done, or has given up and the arm has come to rest behind its brake, which is waited for no
+    /// longer than [`STANDSTILL_LIMIT`].
     ///
     /// # Errors
     /// The scenario could not be completed; see [`RunError`]. Everything up to then has been
     /// handed to `observer`.
-    pub fn run<O: Observer>(
+    pub fn run<O: Observer, P: Pace>(
         &mut self,
-        operator: &mut Operator,
+        pace: &mut P,
         observer: &mut O,
     ) -> Result<(), RunError> {
-        while !operator.is_done() {
-            self.step(operator, observer)?;
+        let outcome = loop {
+            if let Some(outcome) = self.world.outcome.clone() {
+                break outcome;
+            }
+            self.step(pace, observer)?;
+        };
+        if outcome.is_err() {
+            let limit = self.now() + STANDSTILL_LIMIT;
+            while !self.is_at_rest() && self.now() < limit {
+                self.step(pace, observer)?;
+            }
         }
-        Ok(())
+        outcome.map_err(RunError::from)
     }
 
     /// One sample: from this sampling instant up to the next.
     ///
     /// # Errors
     /// See [`Rig::run`].
-    pub fn step<O: Observer>(
+    pub fn step<O: Observer, P: Pace>(
         &mut self,
-        operator: &mut Operator,
+        pace: &mut P,
         observer: &mut O,
     ) -> Result<(), RunError> {
-        let now = self.sample * self.period;
-        let next = now + self.period;
-        self.plant.advance_to(now);
-        let feedback = self.drives.feedback(&mut self.plant);
-        if self.drives.silent() > SILENT_LIMIT {
-            return Err(RunError::Silent(self.drives.silent()));
-        }
-        let mut truth = self.truth(now);
-        self.enqueue(self.drives_at, now, &feedback);
-        let (frame, hand) = operator.step(now)?;
-        if let Some(frame) = frame {
-            self.enqueue(self.operator_at, now, &frame);
-        }
-        if let Some(hand) = hand {
-            match hand {
-                Hand::Attach(payload) => self.plant.attach(payload),
-                Hand::Release => self.plant.release(),
-                Hand::BeginCycle | Hand::EndCycle => {}
-            }
-            observer.hand(&hand);
-        }
-        self.poll_controller(now, None)?;
-        while let Some(event) = self.next_event(next) {
-            match event {
-                Event::Computed(time, frame) => self.enqueue(self.controller_at, time, &frame),
-                Event::Delivered(delivery) => self.deliver(&delivery, operator, observer)?,
-            }
-        }
-        let controller = self.controller.node().controller();
-        truth.rq = array(&controller.reference().q);
-        truth.rqd = array(&controller.reference().qd);
-        truth.mode = controller.mode();
-        observer.sample(&truth)?;
+        let now = self.now();
+        pace.sample(now).map_err(RunError::Pace)?;
+        self.world.plant.advance_to(now.nanos());
+        let plant = PlantState::of(&self.world.plant, now);
         self.sample += 1;
+        while let Some(event) = self.next_event(self.now()) {
+            match event {
+                Event::Enqueue(node, time, frame) => self.enqueue(node, time, &frame),
+                Event::Delivery(None) => {}
+                Event::Delivery(Some(delivery)) => self.deliver(&delivery, observer)?,
+                Event::Wake(seat, time) => self.call(seat, time, None, observer)?,
+            }
+        }
+        let mind = self.world.mind;
+        observer.sample(&Truth { plant, mind })?;
         Ok(())
     }
 
-    fn truth(&self, now: u64) -> Truth {
-        let pose = self.plant.pose();
-        Truth {
-            t: now as f64 * 1e-9,
-            q: self.plant.q(),
-            qd: self.plant.qd(),
-            rq: [0.0; 4],
-            rqd: [0.0; 4],
-            tau: self.plant.joint_effort(),
-            tool: [pose.x, pose.y, pose.z, pose.yaw],
-            saturated: self.drives.is_saturated(),
-            mode: Mode::Boot,
-        }
-    }
-
-    fn enqueue(&mut self, node: NodeId, time: u64, frame: &CanFrame) {
+    fn enqueue(&mut self, node: NodeId, time: Instant, frame: &CanFrame) {
         if self.bus.enqueue(node, time, frame).is_err() {
             self.dropped += 1;
         }
     }
 
-    /// The earliest thing to happen before `end`.
-    fn next_event(&mut self, end: u64) -> Option<Event> {
-        let computed = self.computed.front().map(|(time, _)| *time);
-        let valid = self.bus.next_event();
-        match (computed, valid) {
-            // What enters the bus at the instant a frame ends may still win the next arbitration.
-            (Some(time), valid) if time < end && valid.is_none_or(|valid| time <= valid) => {
-                let (time, frame) = self.computed.pop_front()?;
-                Some(Event::Computed(time, frame))
-            }
-            (_, Some(valid)) if valid <= end => self.bus.pop_delivery(valid).map(Event::Delivered),
-            _ => None,
+    /// The earliest thing to happen before `end`. A frame that is received at that very instant belongs to the sample that ends.
+    fn next_event(&mut self, end: Instant) -> Option<Event> {
+        let pending = self.pending.front().map_or(Instant::MAX, |next| next.0);
+        let valid = self.bus.next_event().unwrap_or(Instant::MAX);
+        let (wake, seat) = self
+            .seats
+            .iter()
+            .enumerate()
+            // One that has started again asks for a time that is over.
+            .filter_map(|(index, seat)| Some((seat.peer.wake()?.max(self.last), index)))
+            .min()
+            .unwrap_or((Instant::MAX, 0));
+        // What enters the bus at the instant a frame ends may still win the next arbitration.
+        if pending < end && pending <= valid && pending <= wake {
+            let (time, node, frame) = self.pending.pop_front()?;
+            self.last = time;
+            Some(Event::Enqueue(node, time, frame))
+        } else if valid <= end && valid <= wake {
+            self.last = valid;
+            Some(Event::Delivery(self.bus.pop_delivery(valid)))
+        } else if wake < end {
+            self.last = wake;
+            Some(Event::Wake(seat, wake))
+        } else {
+            None
         }
     }
 
     fn deliver<O: Observer>(
         &mut self,
         delivery: &Delivery,
-        operator: &mut Operator,
         observer: &mut O,
     ) -> Result<(), RunError> {
         observer.frame(delivery.time, &delivery.frame)?;
-        if !delivery.from.contains(self.drives_at) {
-            self.plant.advance_to(delivery.time);
-            self.drives.receive(&delivery.frame, &mut self.plant);
-        }
-        if !delivery.from.contains(self.operator_at) {
-            operator.receive(&delivery.frame);
-        }
-        if !delivery.from.contains(self.controller_at) {
-            self.poll_controller(delivery.time, Some(&delivery.frame))?;
+        for seat in 0..self.seats.len() {
+            if !delivery.from.contains(self.seats[seat].node) {
+                self.call(seat, delivery.time, Some(&delivery.frame), observer)?;
+            }
         }
         Ok(())
     }
 
-    /// The controller looks at what has come; what it sends is ready after its computing time.
-    fn poll_controller(
+    fn call<O: Observer>(
         &mut self,
-        now: u64,
+        seat: usize,
+        now: Instant,
         received: Option<&CanFrame>,
-    ) -> Result<(), EndpointError> {
-        self.controller.poll(now / 1000, received, &mut self.sent)?;
-        // What is sent later does not overtake.
-        let last = self.computed.back().map_or(0, |(time, _)| *time);
-        let time = last.max(now + self.controller.latency_ns());
-        for frame in self.sent.drain(..) {
-            self.computed.push_back((time, frame));
+        observer: &mut O,
+    ) -> Result<(), PeerError> {
+        let Seat { peer, node } = &mut self.seats[seat];
+        peer.poll(now, received, &mut self.world, &mut self.out)?;
+        debug_assert!(received.is_some() || peer.wake().is_none_or(|wake| wake > now));
+        for (time, frame) in self.out.drain(..) {
+            let place = self.pending.partition_point(|(other, ..)| *other <= time);
+            self.pending.insert(place, (time.max(now), *node, frame));
+        }
+        for hand in self.world.hands.drain(..) {
+            observer.hand(&hand);
         }
         Ok(())
     }
-}
-
-enum Event {
-    Computed(u64, CanFrame),
-    Delivered(Delivery),
 }
 
 impl RigConfig {
-    /// What the controller of this rig is told.
+    /// What the controller of this rig is configured with.
     pub fn controller(&self) -> Config {
-        let period = (1e9 / self.rate_hz).round() * 1e-9;
-        let mut config = Config::new(self.nominal, period as f32);
-        config.command_delay = command_delay(&self.timing);
+        let mut config = Config::new(self.nominal, self.period);
+        config.command_delay = command_delay(&self.timing).seconds() as f32;
         config
     }
 }
 
-/// Samples without a command after which the controller counts as gone.
-const SILENT_LIMIT: u64 = 1000;
-
-fn array(v: &nalgebra::Vector4<f32>) -> [f64; 4] {
-    [v.x, v.y, v.z, v.w].map(f64::from)
-}
-
-/// Time from a sample until its command acts, s: two frames and the computing time, on an
-/// otherwise idle bus with the mean of the stuff bits.
-fn command_delay(timing: &BitTiming) -> f32 {
+/// Time from a sample until its command acts: two frames and the computing time, on an
+/// otherwise idle bus with about half of the stuff bits there can be.
+fn command_delay(timing: &BitTiming) -> Duration {
     let frame = |info| timing.duration(FrameBits::exact(&specimen(info)));
-    let feedback = frame(&table::FEEDBACK);
-    let command = frame(&table::COMMAND);
-    ((feedback + COMPUTE_NS + command) as f64 * 1e-9) as f32
+    frame(&table::FEEDBACK) + COMPUTE + frame(&table::COMMAND)
 }
 
-/// A frame of this message, about half stuffed: alternating bits need no stuff bits, equal ones
-/// the most.
 fn specimen(info: &MessageInfo) -> CanFrame {
-    let id = StandardId::new(info.id).unwrap_or(StandardId::MAX);
-    let data = [0x0F; FD_MAX];
-    let data = &data[..info.len];
-    let frame = if info.is_fd() {
-        CanFrame::fd(id, data, true)
-    } else {
-        CanFrame::classical(id, data)
-    };
-    frame.expect("the message table holds lengths that frames can have")
+    info.specimen()
+        .expect("the message table holds lengths that frames can have")
 }
 
 /// Worst-case load of the bus at a control rate.
@@ -415,4 +326,19 @@ pub fn admit(timing: &BitTiming, rate_hz: f64) -> Result<f64, Overload> {
         })
         .collect();
     crate::bus::admit(timing, &traffic)
+}
+
+#[cfg(test)]
+mod tests {
+    use firmware::mechanics::arm::IRB_930;
+
+    use super::*;
+
+    /// A controller that nobody configures for its bus assumes the default one.
+    #[test]
+    fn the_controllers_own_delay_is_that_of_the_default_bus() {
+        let delay = command_delay(&BitTiming::default());
+        let config = Config::new(IRB_930, Period::of_rate(1000.0));
+        assert_eq!(config.command_delay, delay.seconds() as f32, "{delay:?}");
+    }
 }

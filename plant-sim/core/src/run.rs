@@ -4,9 +4,12 @@ use std::io;
 
 use firmware::control::controller::Config;
 
-use crate::endpoint::{Endpoint, EndpointError, InProcess};
+use crate::controller::InProcess;
+use crate::drives::Drives;
+use crate::observer::{Observer, Pace};
 use crate::operator::Operator;
-use crate::rig::{Observer, Rig, RunError};
+use crate::peer::{Peer, PeerError};
+use crate::rig::{Rig, RunError};
 use crate::setup::{RunConfig, SetupError};
 use crate::summary::{Collector, Summary};
 
@@ -18,7 +21,7 @@ pub enum Failure {
     Setup(#[from] SetupError),
     /// The controller could not be started.
     #[error(transparent)]
-    Controller(#[from] EndpointError),
+    Controller(#[from] PeerError),
     /// An observer could not keep what it was shown.
     #[error("cannot write results: {0}")]
     Output(io::Error),
@@ -31,24 +34,33 @@ pub enum Failure {
 /// # Errors
 /// See [`Failure`].
 pub fn in_process<O: Observer>(config: &RunConfig, observer: &mut O) -> Result<Summary, Failure> {
-    with_controller(config, |config| Ok(InProcess::new(config)), observer)
+    with_controller(
+        config,
+        |config| Ok(InProcess::new(config)),
+        &mut (),
+        observer,
+    )
 }
 
-/// Runs a scenario with the controller that `connect` starts.
+/// Runs a scenario with the controller that `connect` starts, as fast as `pace` lets it.
 ///
 /// # Errors
 /// See [`Failure`].
-pub fn with_controller<E: Endpoint, O: Observer>(
+pub fn with_controller<C: Peer, P: Pace, O: Observer>(
     config: &RunConfig,
-    connect: impl FnOnce(Config) -> Result<E, EndpointError>,
+    connect: impl FnOnce(Config) -> Result<C, PeerError>,
+    pace: &mut P,
     observer: &mut O,
 ) -> Result<Summary, Failure> {
     let rig = config.rig()?;
     let controller = connect(rig.controller())?;
-    let mut rig = Rig::new(&rig, controller);
-    let mut operator = Operator::new(&config.scenario);
+    let drives = Drives::new(&rig.actual, rig.period);
+    let mut rig = Rig::new(&rig);
+    rig.attach(drives);
+    rig.attach(Operator::new(&config.scenario));
+    rig.attach(controller);
     let mut observers = (Collector::new(config), observer);
-    match rig.run(&mut operator, &mut observers) {
+    match rig.run(pace, &mut observers) {
         Err(RunError::Output(source)) => Err(Failure::Output(source)),
         result => Ok(observers.0.finish(config, &rig, &result)),
     }

@@ -1,6 +1,7 @@
 //! From a scenario and two robots to a rig: what is to run with what, checked.
 
 use firmware::mechanics::arm::{self, ArmModel};
+use protocol::time::Period;
 use protocol::wire::BitTiming;
 
 use crate::bus::Overload;
@@ -94,11 +95,11 @@ impl RunConfig {
             start: start(scenario, &actual)?,
             actual,
             nominal,
-            rate_hz: scenario.rate_hz,
+            period: Period::of_rate(scenario.rate_hz),
             timing: BitTiming::default(),
         };
-        rig::admit(&rig.timing, rig.rate_hz).map_err(|source| SetupError::Link {
-            rate_hz: rig.rate_hz,
+        rig::admit(&rig.timing, scenario.rate_hz).map_err(|source| SetupError::Link {
+            rate_hz: scenario.rate_hz,
             source,
         })?;
         Ok(rig)

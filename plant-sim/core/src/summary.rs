@@ -7,12 +7,13 @@ use protocol::frame::CanFrame;
 use protocol::messages::{FaultAxis, Message, Node};
 use protocol::schema::Content;
 use protocol::table;
+use protocol::time::Instant;
 use serde::Serialize;
 
-use crate::endpoint::Endpoint;
 use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
+use crate::observer::{Observer, Truth};
 use crate::operator::Hand;
-use crate::rig::{Observer, Rig, RunError, Truth};
+use crate::rig::{Rig, RunError};
 use crate::setup::RunConfig;
 
 /// Summary of a run, as `summary.json` holds it. Times in s, lengths in mm, shares of 1.
@@ -34,6 +35,8 @@ pub struct Summary {
     pub completed: bool,
     /// Why not.
     pub error: Option<String>,
+    /// Whether the arm stood still behind its closed brake in the end.
+    pub at_rest: bool,
     /// From the start of motion until the tool is back within 1 mm and stays.
     pub cycle_time_s: Option<Spread>,
     /// From the end of the commanded motion until the tool is within 0.01 mm and stays.
@@ -113,6 +116,9 @@ pub struct Collector {
     /// An emergency has come, and no state since.
     awaits_state: bool,
     target: [f64; 3],
+    /// Whether a command has come since the last sample; `None` before the first of all.
+    answered: Option<bool>,
+    overruns: u64,
 }
 
 impl Collector {
@@ -123,22 +129,27 @@ impl Collector {
             faults: Vec::new(),
             awaits_state: false,
             target: config.cycle_target(),
+            answered: None,
+            overruns: 0,
         }
     }
 
     /// What the run came to; `result` says how it ended.
-    pub fn finish<E: Endpoint>(
+    pub fn finish(
         self,
         config: &RunConfig,
-        rig: &Rig<E>,
+        rig: &Rig<'_>,
         result: &Result<(), RunError>,
     ) -> Summary {
         let Self {
-            metrics, faults, ..
+            metrics,
+            faults,
+            overruns,
+            ..
         } = self;
         let scenario = &config.scenario;
         let bus = rig.bus();
-        let sim = rig.time();
+        let sim = rig.now();
         Summary {
             scenario: scenario.name.clone(),
             robot: config.nominal.name.clone(),
@@ -148,6 +159,7 @@ impl Collector {
             cycles: metrics.cycles.len() as u32,
             completed: result.is_ok(),
             error: result.as_ref().err().map(ToString::to_string),
+            at_rest: rig.is_at_rest(),
             cycle_time_s: metrics.cycle_time_s(),
             settle_time_s: metrics.settle_time_s(),
             tracking_error_mm: metrics.tracking_error_mm(),
@@ -158,21 +170,25 @@ impl Collector {
             thermal_utilisation: metrics.thermal_utilisation(),
             speed_utilisation: metrics.speed_utilisation(),
             longest_saturation_s: metrics.longest_saturation as f64 / scenario.rate_hz,
-            bus_load: bus.total.load((sim * 1e9) as u64),
+            bus_load: bus.total.load(sim.since(Instant::ORIGIN)),
             frames: bus.total.frames,
-            overruns: rig.drives().overruns(),
+            overruns,
             frames_lost: rig.dropped() + 2 * bus.collisions,
             faults,
-            sim_time_s: sim,
+            sim_time_s: sim.seconds(),
             each_cycle: metrics.cycles,
         }
     }
 }
 
 impl Observer for Collector {
-    fn frame(&mut self, time: u64, frame: &CanFrame) -> io::Result<()> {
+    fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         match table::of_frame(frame).map(|info| info.content) {
             Some(Content::Emergency(Node::Controller)) => {}
+            Some(Content::Command) => {
+                self.answered = Some(true);
+                return Ok(());
+            }
             Some(Content::State) if self.awaits_state => {}
             _ => return Ok(()),
         }
@@ -182,7 +198,7 @@ impl Observer for Collector {
         match received.message {
             Message::Emergency(_, emergency) => {
                 let mut fault = Fault {
-                    time_s: time as f64 * 1e-9,
+                    time_s: time.seconds(),
                     cause: emergency.cause.name(),
                     code: format!("{:04x}", emergency.code),
                     description: emergency.cause.describe(),
@@ -212,6 +228,11 @@ impl Observer for Collector {
 
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         self.metrics.sample(truth);
+        if let Some(answered) = &mut self.answered
+            && !std::mem::take(answered)
+        {
+            self.overruns += 1;
+        }
         Ok(())
     }
 

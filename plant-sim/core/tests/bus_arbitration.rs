@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use proptest::prelude::*;
+use protocol::time::{Duration, Instant};
 use protocol::wire::{BitTiming, FrameBits};
 use protocol::{
     bus::TransmitError,
@@ -12,7 +13,7 @@ use sim::bus::{BuiltinBus, Delivery, MAX_LOAD, NodeId, Traffic, admit, worst_cas
 
 /// From valid for receivers to the end of the intermission at 1 Mbit/s, sample point 80 %: the rest of the last but one
 /// bit of end of frame, its last bit, three bits of intermission.
-const AFTER_VALID: u64 = 200 + 1000 + 3000;
+const AFTER_VALID: Duration = Duration::from_nanos(200 + 1000 + 3000);
 
 fn standard(id: u16) -> Id {
     Id::Standard(StandardId::new(id).unwrap())
@@ -26,7 +27,11 @@ fn classical(id: Id, data: &[u8]) -> CanFrame {
     CanFrame::classical(id, data).unwrap()
 }
 
-fn duration(frame: &CanFrame) -> u64 {
+fn ns(ns: u64) -> Instant {
+    Instant::from_nanos(ns)
+}
+
+fn duration(frame: &CanFrame) -> Duration {
     BitTiming::default().duration(FrameBits::exact(frame))
 }
 
@@ -37,19 +42,19 @@ fn bus_of(nodes: usize) -> (BuiltinBus, Vec<NodeId>) {
 }
 
 fn drain(bus: &mut BuiltinBus) -> Vec<Delivery> {
-    std::iter::from_fn(|| bus.pop_delivery(u64::MAX)).collect()
+    std::iter::from_fn(|| bus.pop_delivery(Instant::MAX)).collect()
 }
 
 #[test]
 fn a_lone_frame_starts_at_once_and_is_valid_before_its_last_bit() {
     let (mut bus, nodes) = bus_of(2);
     let frame = classical(standard(0x123), &[1, 2, 3]);
-    bus.enqueue(nodes[0], 5_000, &frame).unwrap();
-    let valid = 5_000 + duration(&frame) - AFTER_VALID;
+    bus.enqueue(nodes[0], ns(5_000), &frame).unwrap();
+    let valid = ns(5_000) + duration(&frame).saturating_sub(AFTER_VALID);
     assert_eq!(bus.next_event(), Some(valid));
-    assert_eq!(bus.pop_delivery(valid - 1), None);
+    assert_eq!(bus.pop_delivery(ns(valid.nanos() - 1)), None);
     let delivery = bus.pop_delivery(valid).unwrap();
-    assert_eq!((delivery.start, delivery.time), (5_000, valid));
+    assert_eq!((delivery.start, delivery.time), (ns(5_000), valid));
     assert_eq!(delivery.frame, frame);
     assert!(delivery.from.contains(nodes[0]) && !delivery.from.contains(nodes[1]));
     assert_eq!(bus.next_event(), None);
@@ -75,7 +80,7 @@ fn arbitration_follows_the_bits_of_the_field() {
     ];
     let (mut bus, nodes) = bus_of(by_priority.len());
     for (node, frame) in nodes.iter().zip(by_priority.iter().rev()) {
-        bus.enqueue(*node, 0, frame).unwrap();
+        bus.enqueue(*node, ns(0), frame).unwrap();
     }
     let order: Vec<CanFrame> = drain(&mut bus).iter().map(|d| d.frame).collect();
     assert_eq!(order, by_priority);
@@ -87,13 +92,16 @@ fn a_frame_under_way_is_not_preempted_and_the_next_starts_after_the_intermission
     let low = classical(standard(0x700), &[0; 8]);
     let high = classical(standard(0x001), &[]);
     let middle = classical(standard(0x240), &[1]);
-    bus.enqueue(nodes[0], 0, &low).unwrap();
-    bus.enqueue(nodes[1], 1, &middle).unwrap();
-    bus.enqueue(nodes[2], 2, &high).unwrap();
+    bus.enqueue(nodes[0], ns(0), &low).unwrap();
+    bus.enqueue(nodes[1], ns(1), &middle).unwrap();
+    bus.enqueue(nodes[2], ns(2), &high).unwrap();
     let starts: Vec<_> = drain(&mut bus).iter().map(|d| (d.frame, d.start)).collect();
-    let after_low = duration(&low);
+    let after_low = ns(0) + duration(&low);
     let after_high = after_low + duration(&high);
-    assert_eq!(starts, [(low, 0), (high, after_low), (middle, after_high)]);
+    assert_eq!(
+        starts,
+        [(low, ns(0)), (high, after_low), (middle, after_high)]
+    );
 }
 
 #[test]
@@ -101,15 +109,15 @@ fn a_frame_put_in_at_the_instant_of_a_start_takes_part() {
     let (mut bus, nodes) = bus_of(2);
     let low = classical(standard(0x700), &[]);
     let high = classical(standard(0x001), &[]);
-    bus.enqueue(nodes[0], 7, &low).unwrap();
-    bus.enqueue(nodes[1], 7, &high).unwrap();
-    assert_eq!(bus.pop_delivery(u64::MAX).unwrap().frame, high);
+    bus.enqueue(nodes[0], ns(7), &low).unwrap();
+    bus.enqueue(nodes[1], ns(7), &high).unwrap();
+    assert_eq!(bus.pop_delivery(Instant::MAX).unwrap().frame, high);
 
     // The end of the intermission is such an instant too.
-    let again = duration(&high) + 7;
+    let again = ns(7) + duration(&high);
     bus.enqueue(nodes[1], again, &high).unwrap();
-    assert_eq!(bus.pop_delivery(u64::MAX).unwrap().frame, high);
-    assert_eq!(bus.pop_delivery(u64::MAX).unwrap().frame, low);
+    assert_eq!(bus.pop_delivery(Instant::MAX).unwrap().frame, high);
+    assert_eq!(bus.pop_delivery(Instant::MAX).unwrap().frame, low);
 }
 
 #[test]
@@ -117,11 +125,14 @@ fn a_full_controller_refuses_and_counts_until_its_frame_is_sent() {
     let mut bus = BuiltinBus::new(BitTiming::default());
     let node = bus.attach(2);
     let frame = classical(standard(0x123), &[]);
-    assert_eq!(bus.enqueue(node, 0, &frame), Ok(()));
-    assert_eq!(bus.enqueue(node, 0, &frame), Ok(()));
-    assert_eq!(bus.enqueue(node, 0, &frame), Err(TransmitError::QueueFull));
+    assert_eq!(bus.enqueue(node, ns(0), &frame), Ok(()));
+    assert_eq!(bus.enqueue(node, ns(0), &frame), Ok(()));
+    assert_eq!(
+        bus.enqueue(node, ns(0), &frame),
+        Err(TransmitError::QueueFull)
+    );
     assert_eq!(bus.statistics().refused, 1);
-    let first = bus.pop_delivery(u64::MAX).unwrap();
+    let first = bus.pop_delivery(Instant::MAX).unwrap();
     assert_eq!(bus.enqueue(node, first.time, &frame), Ok(()));
     assert_eq!(drain(&mut bus).len(), 2);
 }
@@ -129,12 +140,12 @@ fn a_full_controller_refuses_and_counts_until_its_frame_is_sent() {
 #[test]
 fn one_identifier_from_two_nodes_is_reported_and_both_frames_are_lost() {
     let (mut bus, nodes) = bus_of(3);
-    bus.enqueue(nodes[0], 0, &classical(standard(0x1C0), &[1]))
+    bus.enqueue(nodes[0], ns(0), &classical(standard(0x1C0), &[1]))
         .unwrap();
-    bus.enqueue(nodes[2], 0, &classical(standard(0x1C0), &[2]))
+    bus.enqueue(nodes[2], ns(0), &classical(standard(0x1C0), &[2]))
         .unwrap();
     let bystander = classical(standard(0x7FF), &[]);
-    bus.enqueue(nodes[1], 0, &bystander).unwrap();
+    bus.enqueue(nodes[1], ns(0), &bystander).unwrap();
     let delivered = drain(&mut bus);
     assert_eq!(delivered.len(), 1);
     assert_eq!(delivered[0].frame, bystander);
@@ -142,24 +153,24 @@ fn one_identifier_from_two_nodes_is_reported_and_both_frames_are_lost() {
     let statistics = bus.statistics();
     assert_eq!((statistics.collisions, statistics.total.frames), (1, 1));
     let collision = statistics.first_collision.unwrap();
-    assert_eq!((collision.start, collision.id), (0, standard(0x1C0)));
+    assert_eq!((collision.start, collision.id), (ns(0), standard(0x1C0)));
     assert_eq!(
         collision.nodes.iter().collect::<Vec<_>>(),
         [nodes[0], nodes[2]]
     );
     // The bus was taken at least for the shortest such frame up to its CRC, before the bystander could start.
-    assert!(delivered[0].start > 34_000);
+    assert!(delivered[0].start > ns(34_000));
 }
 
 /// FDF stands behind the arbitration field: a classical and an FD frame of one identifier are no better.
 #[test]
 fn a_classical_and_an_fd_frame_of_one_identifier_collide() {
     let (mut bus, nodes) = bus_of(2);
-    bus.enqueue(nodes[0], 0, &classical(standard(0x1C0), &[]))
+    bus.enqueue(nodes[0], ns(0), &classical(standard(0x1C0), &[]))
         .unwrap();
     let fd = CanFrame::fd(standard(0x1C0), &[], true).unwrap();
-    bus.enqueue(nodes[1], 0, &fd).unwrap();
-    assert_eq!(bus.pop_delivery(u64::MAX), None);
+    bus.enqueue(nodes[1], ns(0), &fd).unwrap();
+    assert_eq!(bus.pop_delivery(Instant::MAX), None);
     assert_eq!(bus.statistics().collisions, 1);
 }
 
@@ -168,8 +179,8 @@ fn a_classical_and_an_fd_frame_of_one_identifier_collide() {
 fn the_same_frame_from_two_nodes_is_carried_once() {
     let (mut bus, nodes) = bus_of(3);
     let stop = classical(standard(0x001), &[1, 0]);
-    bus.enqueue(nodes[0], 0, &stop).unwrap();
-    bus.enqueue(nodes[1], 0, &stop).unwrap();
+    bus.enqueue(nodes[0], ns(0), &stop).unwrap();
+    bus.enqueue(nodes[1], ns(0), &stop).unwrap();
     let delivered = drain(&mut bus);
     assert_eq!(delivered.len(), 1);
     assert_eq!(
@@ -246,10 +257,10 @@ fn any_traffic() -> impl Strategy<Value = Vec<(usize, u64, CanFrame)>> {
 /// Feeds the traffic in order of time, taking deliveries either as they come or only at the end.
 fn run(traffic: &[(usize, u64, CanFrame)], eager: bool) -> (Vec<Delivery>, BuiltinBus) {
     let (mut bus, nodes) = bus_of(4);
-    let mut now = 0;
+    let mut now = ns(0);
     let mut delivered = Vec::new();
     for (node, gap, frame) in traffic {
-        now += gap;
+        now += Duration::from_nanos(*gap);
         if eager {
             delivered.extend(std::iter::from_fn(|| bus.pop_delivery(now)));
         }
@@ -259,12 +270,12 @@ fn run(traffic: &[(usize, u64, CanFrame)], eager: bool) -> (Vec<Delivery>, Built
     (delivered, bus)
 }
 
-fn queued_at(traffic: &[(usize, u64, CanFrame)]) -> HashMap<CanFrame, u64> {
-    let mut now = 0;
+fn queued_at(traffic: &[(usize, u64, CanFrame)]) -> HashMap<CanFrame, Instant> {
+    let mut now = ns(0);
     traffic
         .iter()
         .map(|(_, gap, frame)| {
-            now += gap;
+            now += Duration::from_nanos(*gap);
             (*frame, now)
         })
         .collect()
@@ -306,12 +317,12 @@ proptest! {
     fn the_bus_is_never_idle_while_a_frame_waits(traffic in any_traffic()) {
         let (delivered, _) = run(&traffic, true);
         let queued = queued_at(&traffic);
-        let mut idle = 0;
+        let mut idle = ns(0);
         for (at, delivery) in delivered.iter().enumerate() {
             let oldest = delivered[at..].iter().map(|d| queued[&d.frame]).min().unwrap();
             prop_assert_eq!(delivery.start, oldest.max(idle));
             idle = delivery.start + duration(&delivery.frame);
-            prop_assert_eq!(delivery.time, idle - AFTER_VALID);
+            prop_assert_eq!(delivery.time + AFTER_VALID, idle);
         }
     }
 
@@ -320,12 +331,12 @@ proptest! {
         let (delivered, bus) = run(&traffic, true);
         let queued = queued_at(&traffic);
         let statistics = bus.statistics();
-        let busy: u64 = delivered.iter().map(|d| duration(&d.frame)).sum();
-        let wait = delivered.iter().map(|d| d.start - queued[&d.frame]).max().unwrap();
+        let busy: Duration = delivered.iter().map(|d| duration(&d.frame)).sum();
+        let wait = delivered.iter().map(|d| d.start.since(queued[&d.frame])).max().unwrap();
         prop_assert_eq!(statistics.total.frames, delivered.len() as u64);
         prop_assert_eq!(statistics.total.busy, busy);
         prop_assert_eq!(statistics.total.max_wait, wait);
-        let mut by_id = BTreeMap::<Id, (u64, u64)>::new();
+        let mut by_id = BTreeMap::<Id, (u64, Duration)>::new();
         for delivery in &delivered {
             let entry = by_id.entry(delivery.frame.id()).or_default();
             entry.0 += 1;
@@ -335,7 +346,7 @@ proptest! {
         prop_assert_eq!(got, by_id);
         // The bus is never more than full, up to the end of the last intermission.
         let end = delivered.last().unwrap().time + AFTER_VALID;
-        prop_assert!(statistics.total.load(end) <= 1.0);
+        prop_assert!(statistics.total.load(end.since(ns(0))) <= 1.0);
     }
 
     /// When the caller looks changes nothing, and the same traffic gives the same run.

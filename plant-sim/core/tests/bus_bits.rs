@@ -259,7 +259,7 @@ fn fd_durations_are_the_known_ones() {
     let timing = BitTiming::default();
     for (len, best, worst) in [(24, 75, 89), (32, 88, 105), (48, 113, 137), (64, 139, 169)] {
         let frame = CanFrame::fd(standard(0x1C0), &vec![0; len], true).unwrap();
-        let us = |bits| (timing.duration(bits) as f64 / 1e3).round() as u64;
+        let us = |bits| (timing.duration(bits).nanos() as f64 / 1e3).round() as u64;
         assert_eq!(us(FrameBits::without_stuffing(&frame)), best, "{len} bytes");
         assert_eq!(us(FrameBits::worst_case(&frame)), worst, "{len} bytes");
     }
@@ -314,7 +314,7 @@ fn durations_round_up_to_a_whole_ns() {
         let bits = FrameBits { nominal: 30, data };
         // In thirds of a ns, exactly.
         let exact = 3 * 30_000 + 1000 * u64::from(data);
-        let got = 3 * timing.duration(bits);
+        let got = 3 * timing.duration(bits).nanos();
         assert!((exact..exact + 3).contains(&got), "{data}");
     }
 }

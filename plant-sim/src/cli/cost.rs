@@ -72,8 +72,13 @@ fn measure(args: &CostArgs, image: Option<&PathBuf>, program: &str) -> Result<Co
         channel: Channel::Fifo,
         count: Some(Rc::clone(&costs)),
     };
-    let summary = with_controller(&config, |config| Qemu::start(config, &options), &mut ())
-        .map_err(|error| error.to_string())?;
+    let summary = with_controller(
+        &config,
+        |config| Qemu::start(config, &options),
+        &mut (),
+        &mut (),
+    )
+    .map_err(|error| error.to_string())?;
     if let Some(error) = summary.error {
         return Err(format!("the run was not completed: {error}"));
     }

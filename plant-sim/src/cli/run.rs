@@ -8,11 +8,13 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use link::{AddressError, LinkAddress, SlcanPeer};
-use plant_sim::external::{LockStep, RealTime, Watched};
+use plant_sim::external::{LockStep, RealTime, WallClock};
 use plant_sim::input;
 use plant_sim::qemu::{self, Channel, Qemu};
 use plant_sim::run::{self, Results};
-use sim::endpoint::InProcess;
+use plant_sim::viewers::Viewers;
+use protocol::time::Period;
+use sim::controller::InProcess;
 use sim::model::RobotModel;
 use sim::scenario;
 use sim::selection::LawChoice;
@@ -145,9 +147,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
     };
     let results = match place {
         Place::InProcess => run::execute(&config, &args.out),
-        Place::Watched(server) => run::execute_with(&config, &args.out, |config| {
-            Watched::new(InProcess::new(config), server)
-        }),
+        Place::Watched(server) => {
+            let viewers = Viewers::bind(server)
+                .map_err(|error| format!("the bus cannot be watched: {error}"))?;
+            let connect = |config| Ok(InProcess::new(config));
+            run::execute_with(&config, &args.out, connect, &mut viewers.clone(), viewers)
+        }
         Place::Qemu => {
             let options = qemu::Options {
                 image: args.image.clone(),
@@ -158,24 +163,35 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
                 count: None,
             };
             let mut controller = None;
-            let results = run::execute_with(&config, &args.out, |config| {
-                Ok(controller.insert(Qemu::start(config, &options)?))
-            });
+            let results = run::execute_with(
+                &config,
+                &args.out,
+                |config| Ok(controller.insert(Qemu::start(config, &options)?)),
+                &mut (),
+                (),
+            );
             if let Some(controller) = &mut controller {
                 keep_log(controller, &args.out.join("controller.log"));
             }
             results
         }
         Place::LockStep(bus) => {
-            run::execute_with(&config, &args.out, |config| LockStep::connect(bus, config))
+            let connect = |config| LockStep::connect(bus, config);
+            run::execute_with(&config, &args.out, connect, &mut (), ())
         }
         Place::RealTime(bus) => {
             let mut controller = None;
-            let results = run::execute_with(&config, &args.out, |config| {
-                Ok(controller.insert(RealTime::connect(bus, config)?))
-            });
+            let mut clock = WallClock::new(Period::of_rate(config.scenario.rate_hz));
+            let ends = clock.clone();
+            let results = run::execute_with(
+                &config,
+                &args.out,
+                |config| Ok(controller.insert(RealTime::connect(bus, config, &ends)?)),
+                &mut clock,
+                (),
+            );
             if let Some(controller) = &controller {
-                eprint!("{}", controller.timing().report());
+                eprint!("{}", clock.timing().report());
                 eprintln!("  commands unlike the twin's {}", controller.different());
             }
             results

@@ -17,6 +17,7 @@ use plant_sim::output;
 use plant_sim::play::{PlayError, Player};
 use plant_sim::plot::Plot;
 use plant_sim::replay::Replay;
+use protocol::time::Period;
 use protocol::wire::BitTiming;
 use sim::model::RobotModel;
 use sim::rig::RigConfig;
@@ -262,7 +263,7 @@ fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
     let config = RigConfig {
         nominal: ArmModel::from(&model),
         actual: model,
-        rate_hz: args.rate,
+        period: Period::of_rate(args.rate),
         start: [0.0; 4],
         timing: BitTiming::default(),
     };

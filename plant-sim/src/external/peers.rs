@@ -3,14 +3,14 @@
 use std::time::{Duration, Instant};
 
 use link::{Link, LinkAddress};
-use protocol::bus::Bus;
+use protocol::bus::Bus as _;
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{Message, Nmt, NmtCommand, Node as Name};
+use protocol::messages::{Message, Nmt, Node as Name};
 use protocol::table;
 
 use super::Remote;
-use sim::endpoint::EndpointError;
+use sim::peer::PeerError;
 
 /// How long a bus is listened to before taking part: longer than the pause between two signs of a waiting plant.
 const LISTEN: Duration = Duration::from_millis(300);
@@ -25,9 +25,9 @@ pub fn sender(frame: &CanFrame) -> Option<Name> {
 }
 
 /// Opens the bus, makes sure that no other plant is on it, and waits until a controller is, which starts afresh.
-pub fn meet(address: &LinkAddress) -> Result<Remote, EndpointError> {
+pub fn meet(address: &LinkAddress) -> Result<Remote, PeerError> {
     let bus = address.to_string();
-    let link = Link::open(address).map_err(|error| EndpointError {
+    let link = Link::open(address).map_err(|error| PeerError {
         who: format!("on {bus}"),
         what: format!("is out of reach: {error}"),
     })?;
@@ -61,13 +61,13 @@ pub fn meet(address: &LinkAddress) -> Result<Remote, EndpointError> {
 }
 
 /// Listens until the time is over or, if asked for, a controller speaks: `true` then.
-fn hear(remote: &mut Remote, time: Duration, controller: bool) -> Result<bool, EndpointError> {
+fn hear(remote: &mut Remote, time: Duration, controller: bool) -> Result<bool, PeerError> {
     let end = Instant::now() + time;
     loop {
         while let Some(frame) = remote.link.receive() {
             match sender(&frame) {
                 Some(Name::Drives | Name::Operator) => {
-                    return Err(EndpointError {
+                    return Err(PeerError {
                         who: format!("on {}", remote.bus),
                         what: format!(
                             "belongs to another plant, which sends {frame}; stop one of the two"
@@ -87,10 +87,6 @@ fn hear(remote: &mut Remote, time: Duration, controller: bool) -> Result<bool, E
 }
 
 /// "Start afresh", to the controller.
-fn reset() -> CanFrame {
-    let reset = Nmt {
-        command: NmtCommand::ResetNode,
-        node: Name::Controller.code(),
-    };
-    codec::encode(&Message::Nmt(reset), 0).expect("two bytes without floats")
+pub fn reset() -> CanFrame {
+    codec::encode(&Message::Nmt(Nmt::reset(Name::Controller)), 0).expect("two bytes without floats")
 }

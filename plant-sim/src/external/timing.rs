@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use firmware::control::fault::MAX_GAP_MS;
-use firmware::node::PEER_TIMEOUT_US;
+use firmware::node::PEER_TIMEOUT;
 
 use sim::drives::HOLD_SAMPLES;
 
@@ -156,10 +156,7 @@ impl Timing {
                 "controller bridges missing samples",
                 Duration::from_millis(u64::from(MAX_GAP_MS)),
             ),
-            (
-                "controller takes drives for silent",
-                Duration::from_micros(PEER_TIMEOUT_US),
-            ),
+            ("controller takes drives for silent", PEER_TIMEOUT.into()),
         ]
     }
 

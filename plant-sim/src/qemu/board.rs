@@ -8,11 +8,10 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
 
 use channel::{
     Channel, FRAME_LEN, GREETING_LEN, Measured, REPLY_HEADER, Request, SETUP_LEN, Setup,
@@ -23,15 +22,10 @@ use protocol::frame::CanFrame;
 
 use super::failure;
 use super::serial::Serial;
-use sim::endpoint::EndpointError;
+use super::supervise::{Ended, Watch, supervise};
+use sim::peer::PeerError;
 
 const EMULATOR: &str = "qemu-system-arm";
-/// How often the child is looked at.
-const LOOK: Duration = Duration::from_millis(20);
-/// Looks without an answer after which the board counts as hung: 20 s. An answer takes microseconds.
-const PATIENCE: u32 = 1000;
-/// Looks that a child has to end by itself once the channel is closed: 2 s.
-const FAREWELL: u32 = 100;
 
 /// With `-icount shift=N` an instruction takes 2^N ns of emulated time; at 10, calls of up to 655 000 instructions fit
 /// SysTick's 24 bits.
@@ -64,24 +58,15 @@ pub struct Board {
     watcher: Option<JoinHandle<Ended>>,
 }
 
-/// What the watching thread has to know.
-#[derive(Debug, Default)]
-struct Watch {
-    waiting: AtomicBool,
-    answers: AtomicU64,
-    closing: AtomicBool,
-}
-
-/// How the emulation ended.
-#[derive(Debug)]
-enum Ended {
-    ByItself(io::Result<ExitStatus>, String),
-    Hung,
-}
-
 impl Board {
-    /// Starts the emulator; `count` makes its clock that of instructions.
-    pub fn start(image: &Path, setup: &Setup, count: bool) -> Result<Self, EndpointError> {
+    /// Starts the emulator; `count` makes its clock that of instructions. What the board sends as soon as its bus is open is
+    /// appended to `sent`.
+    pub fn start(
+        image: &Path,
+        setup: &Setup,
+        count: bool,
+        sent: &mut Vec<CanFrame>,
+    ) -> Result<Self, PeerError> {
         if !image.is_file() {
             return Err(failure(format!("has no image at {}", image.display())));
         }
@@ -158,25 +143,26 @@ impl Board {
                 .accept()
                 .map_err(|error| failure(format!("has no UART: {error}")))?;
             board.serial = Some(Serial::new(line));
-            board.serial(Serial::open)?;
+            board.serial(|serial| serial.open(sent))?;
         }
         Ok(board)
     }
 
-    /// Follows a board that starts again, up to where it is ready; returns how it ended before.
-    pub fn restart(&mut self) -> Result<Stop, EndpointError> {
+    /// Follows a board that starts again, up to where it is ready; returns how it ended before. What it sends as soon as its
+    /// bus is open is appended to `sent`.
+    pub fn restart(&mut self, sent: &mut Vec<CanFrame>) -> Result<Stop, PeerError> {
         let stop = self.set_up()?;
         if self.serial.is_some() {
-            self.serial(Serial::open)?;
+            self.serial(|serial| serial.open(sent))?;
         }
         Ok(stop)
     }
 
     /// Takes the greeting, tells the board its setup, and waits until it is ready.
-    fn set_up(&mut self) -> Result<Stop, EndpointError> {
+    fn set_up(&mut self) -> Result<Stop, PeerError> {
         let said = self.wait(|board| listen(&mut board.replies, &mut Vec::new()))?;
         let Said::Greeting(stop) = said else {
-            return Err(failure("goes on where it was to start again"));
+            return Err(failure("did not start again when asked to"));
         };
         let record = self.setup;
         self.say(&record)?;
@@ -189,17 +175,17 @@ impl Board {
         &mut self,
         frame: &CanFrame,
         sent: &mut Vec<CanFrame>,
-    ) -> Result<(), EndpointError> {
+    ) -> Result<(), PeerError> {
         self.serial(|serial| serial.exchange(frame, sent))
     }
 
     /// Hands over a frame on the UART that resets the board: there is no answer.
-    pub fn send(&mut self, frame: &CanFrame) -> Result<(), EndpointError> {
+    pub fn send(&mut self, frame: &CanFrame) -> Result<(), PeerError> {
         self.serial(|serial| serial.send(frame))
     }
 
     /// Closes the bus on the UART; returns how many bytes the board's receiver has lost.
-    pub fn close_bus(&mut self) -> Result<u32, EndpointError> {
+    pub fn close_bus(&mut self) -> Result<u32, PeerError> {
         self.serial(Serial::close)?;
         Ok(self.answer(&mut Vec::new())?.number)
     }
@@ -207,7 +193,7 @@ impl Board {
     fn serial<T>(
         &mut self,
         what: impl FnOnce(&mut Serial<UnixStream>) -> io::Result<T>,
-    ) -> Result<T, EndpointError> {
+    ) -> Result<T, PeerError> {
         self.wait(|board| match &mut board.serial {
             Some(serial) => what(serial),
             None => Err(io::ErrorKind::NotConnected.into()),
@@ -219,17 +205,17 @@ impl Board {
         &mut self,
         request: &Request,
         sent: &mut Vec<CanFrame>,
-    ) -> Result<Measured, EndpointError> {
+    ) -> Result<Measured, PeerError> {
         self.tell(request)?;
         self.answer(sent)
     }
 
     /// Asks for what has no answer: the board is to start again.
-    pub fn tell(&mut self, request: &Request) -> Result<(), EndpointError> {
+    pub fn tell(&mut self, request: &Request) -> Result<(), PeerError> {
         self.say(&request.to_bytes())
     }
 
-    fn answer(&mut self, sent: &mut Vec<CanFrame>) -> Result<Measured, EndpointError> {
+    fn answer(&mut self, sent: &mut Vec<CanFrame>) -> Result<Measured, PeerError> {
         match self.wait(|board| listen(&mut board.replies, sent))? {
             Said::Reply(measured) => Ok(measured),
             Said::Greeting(stop) => Err(failure(format!(
@@ -241,10 +227,7 @@ impl Board {
     }
 
     /// Waits for the board, under the eyes of the watching thread.
-    fn wait<T>(
-        &mut self,
-        what: impl FnOnce(&mut Self) -> io::Result<T>,
-    ) -> Result<T, EndpointError> {
+    fn wait<T>(&mut self, what: impl FnOnce(&mut Self) -> io::Result<T>) -> Result<T, PeerError> {
         self.watch.waiting.store(true, Ordering::Relaxed);
         let answer = what(self);
         self.watch.waiting.store(false, Ordering::Relaxed);
@@ -252,7 +235,7 @@ impl Board {
         answer.map_err(|error| self.ended(&error))
     }
 
-    fn say(&mut self, record: &[u8]) -> Result<(), EndpointError> {
+    fn say(&mut self, record: &[u8]) -> Result<(), PeerError> {
         let Some(requests) = &mut self.requests else {
             return Err(failure("has ended"));
         };
@@ -262,9 +245,9 @@ impl Board {
     }
 
     /// Why there is no answer.
-    fn ended(&mut self, error: &io::Error) -> EndpointError {
+    fn ended(&mut self, error: &io::Error) -> PeerError {
         if error.kind() == io::ErrorKind::InvalidData {
-            return failure(format!("does not speak our language: {error}"));
+            return failure(format!("uses another protocol: {error}"));
         }
         match self.close() {
             Some(Ended::Hung) => failure("did not answer for 20 s"),
@@ -332,48 +315,11 @@ fn listen(replies: &mut impl Read, sent: &mut Vec<CanFrame>) -> io::Result<Said>
     Ok(Said::Reply(measured))
 }
 
-/// Waits for the child to end, and sees to it that it does.
-fn supervise(mut child: Child, watch: &Watch) -> Ended {
-    let mut seen = (0, 0);
-    let mut farewell = 0;
-    loop {
-        match child.try_wait() {
-            Ok(None) => {}
-            Ok(Some(status)) => break Ended::ByItself(Ok(status), said(&mut child)),
-            Err(error) => break Ended::ByItself(Err(error), String::new()),
-        }
-        let answers = watch.answers.load(Ordering::Relaxed);
-        seen = match seen {
-            (last, looks) if last == answers && watch.waiting.load(Ordering::Relaxed) => {
-                (last, looks + 1)
-            }
-            _ => (answers, 0),
-        };
-        farewell += u32::from(watch.closing.load(Ordering::Relaxed));
-        if seen.1 > PATIENCE || farewell > FAREWELL {
-            // SIGKILL: a blocked emulator does not listen to less.
-            let _ = child.kill();
-            let _ = child.wait();
-            break Ended::Hung;
-        }
-        thread::sleep(LOOK);
-    }
-}
-
-/// What a child that has ended has written to standard error.
-fn said(child: &mut Child) -> String {
-    let mut text = String::new();
-    if let Some(stderr) = &mut child.stderr {
-        let _ = stderr.read_to_string(&mut text);
-    }
-    text
-}
-
 /// A directory for the names that the emulator opens.
 struct Place(PathBuf);
 
 impl Place {
-    fn new() -> Result<Self, EndpointError> {
+    fn new() -> Result<Self, PeerError> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let name = format!("plant-sim-{}-{number}", std::process::id());
@@ -389,7 +335,7 @@ impl Drop for Place {
     }
 }
 
-fn unusable(path: &Path, error: &io::Error) -> EndpointError {
+fn unusable(path: &Path, error: &io::Error) -> PeerError {
     failure(format!("cannot be reached: {}: {error}", path.display()))
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use super::failure;
-use sim::endpoint::EndpointError;
+use sim::peer::PeerError;
 
 const PACKAGE: &str = "mps2-an386";
 
@@ -12,7 +12,7 @@ const PACKAGE: &str = "mps2-an386";
 ///
 /// # Errors
 /// It cannot be built; with what to do about it.
-pub fn build(program: &str) -> Result<PathBuf, EndpointError> {
+pub fn build(program: &str) -> Result<PathBuf, PeerError> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/board/cargo");
     if !script.exists() {
         return Err(failure(format!(

@@ -26,8 +26,8 @@ impl<S: Read + Write> Serial<S> {
         }
     }
 
-    /// Opens the bus: 1 Mbit/s, data phase 5 Mbit/s.
-    pub fn open(&mut self) -> io::Result<()> {
+    /// Opens the bus: 1 Mbit/s, data phase 5 Mbit/s. What the board sends then is appended to `sent`.
+    pub fn open(&mut self, sent: &mut Vec<CanFrame>) -> io::Result<()> {
         // An empty line first: it ends whatever stood in the line before.
         for line in [
             Line::Empty,
@@ -36,7 +36,7 @@ impl<S: Read + Write> Serial<S> {
             Line::Open,
         ] {
             self.say(line)?;
-            self.answer(&mut Vec::new())?;
+            self.answer(sent)?;
         }
         Ok(())
     }

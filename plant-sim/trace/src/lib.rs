@@ -15,6 +15,7 @@
 pub mod convert;
 pub mod dbc;
 pub mod decode;
+pub mod difference;
 pub mod fields;
 mod line;
 mod reader;

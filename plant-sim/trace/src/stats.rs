@@ -68,7 +68,7 @@ impl Gatherer {
                 return;
             }
         };
-        let busy = self.timing.duration(FrameBits::exact(frame));
+        let busy = self.timing.duration(FrameBits::exact(frame)).nanos();
         self.busy_ns += busy;
         let window = self.newest_us.saturating_sub(first) / WINDOW_US;
         if window != self.window {

@@ -29,7 +29,7 @@ pub use slcan_port::SlcanPort;
 pub use socketcan::SocketCan;
 pub use stamped::Stamped;
 
-use protocol::bus::{Bus, TransmitError};
+use protocol::bus::{Bus, Transmit, TransmitError};
 use protocol::frame::CanFrame;
 
 /// An open link to a bus.
@@ -111,7 +111,9 @@ impl Bus for Link {
     fn receive(&mut self) -> Option<CanFrame> {
         self.take().map(|stamped| stamped.frame)
     }
+}
 
+impl Transmit for Link {
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
         match self {
             Self::SocketCan(link) => link.transmit(frame),

@@ -6,7 +6,7 @@ use std::net::{TcpListener, TcpStream};
 use std::time::Duration;
 
 use link::{Clients, Link, LinkAddress, LinkError, SlcanHub, SlcanPeer};
-use protocol::bus::{Bus, TransmitError};
+use protocol::bus::{Bus, Transmit, TransmitError};
 use protocol::frame::{CanFrame, ExtendedId, StandardId};
 
 /// Long enough for any machine; reached only when a test fails.

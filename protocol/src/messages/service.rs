@@ -27,6 +27,17 @@ pub struct Nmt {
     pub node: u8,
 }
 
+impl Nmt {
+    /// "Start afresh", to `node`.
+    #[must_use]
+    pub const fn reset(node: Node) -> Self {
+        Self {
+            command: NmtCommand::ResetNode,
+            node: node.code(),
+        }
+    }
+}
+
 codes! {
     /// Command specifiers of CiA 301.
     pub enum NmtCommand {

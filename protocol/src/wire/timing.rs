@@ -3,6 +3,7 @@
 use core::fmt;
 
 use super::bits::{FrameBits, INTERMISSION};
+use crate::time::Duration;
 
 /// Highest nominal bit rate, bit/s (ISO 11898-2).
 const MAX_NOMINAL: u32 = 1_000_000;
@@ -90,28 +91,28 @@ impl BitTiming {
         })
     }
 
-    /// How long so many bits take, ns; either phase rounded up to a whole ns.
+    /// How long so many bits take; either phase rounded up to a whole ns.
     #[must_use]
-    pub fn duration(&self, bits: FrameBits) -> u64 {
-        nanoseconds(u64::from(bits.nominal) * 1000, self.nominal)
-            + nanoseconds(u64::from(bits.data) * 1000, self.data)
+    pub fn duration(&self, bits: FrameBits) -> Duration {
+        time_of(u64::from(bits.nominal) * 1000, self.nominal)
+            + time_of(u64::from(bits.data) * 1000, self.data)
     }
 
-    /// From the instant a frame is valid for its receivers to the end of the intermission, ns.
+    /// From the instant a frame is valid for its receivers to the end of the intermission.
     ///
     /// Receivers take a frame as valid at the sample point of the last but one bit of end of frame: they ignore the
     /// value of the last one (ISO 11898-1, frame validation).
     #[must_use]
-    pub fn after_valid(&self) -> u64 {
+    pub fn after_valid(&self) -> Duration {
         let whole_bits = u64::from(INTERMISSION + 1);
-        nanoseconds(
+        time_of(
             whole_bits * 1000 + 1000 - u64::from(self.sample_point),
             self.nominal,
         )
     }
 }
 
-/// Time of `thousandths` of a bit at `rate` bit/s, ns, rounded up.
-fn nanoseconds(thousandths: u64, rate: u32) -> u64 {
-    (thousandths * 1_000_000).div_ceil(u64::from(rate))
+/// Time of `thousandths` of a bit at `rate` bit/s, rounded up.
+fn time_of(thousandths: u64, rate: u32) -> Duration {
+    Duration::from_nanos((thousandths * 1_000_000).div_ceil(u64::from(rate)))
 }

@@ -1,30 +1,31 @@
 //! What time it is for the controller.
 
-use std::time::{Duration, Instant};
+use std::time;
 
 use firmware::cabinet::sample_clock::SampleClock;
 use protocol::frame::CanFrame;
 use protocol::table;
+use protocol::time::{Duration, Instant, Period};
 
 /// Silence of the drives after which a clock in lock-step runs by itself. Longer than any pause of a loaded machine: a
 /// plant that only computes must not look as if it had died.
-const LOCK_STEP_LIMIT: Duration = Duration::from_secs(1);
+const LOCK_STEP_LIMIT: time::Duration = time::Duration::from_secs(1);
 
 /// Source of the time that the node is given.
 pub enum Clock {
     /// The machine's: for drives that sample in real time.
     RealTime {
         /// Origin.
-        started: Instant,
+        started: time::Instant,
     },
     /// The drives' samples: for a plant in lock-step.
     LockStep {
         /// Time.
         clock: SampleClock,
-        /// Sampling period, ns.
-        period_ns: u64,
+        /// Sampling period.
+        period: Period,
         /// Last sign of the plant, or the last time that the clock was moved on without one.
-        heard: Instant,
+        heard: time::Instant,
         /// Whether the plant is there.
         present: bool,
     },
@@ -33,23 +34,23 @@ pub enum Clock {
 impl Clock {
     pub fn real_time() -> Self {
         Self::RealTime {
-            started: Instant::now(),
+            started: time::Instant::now(),
         }
     }
 
-    pub fn lock_step(period_ns: u64) -> Self {
+    pub fn lock_step(period: Period) -> Self {
         Self::LockStep {
-            clock: SampleClock::new(period_ns),
-            period_ns,
-            heard: Instant::now(),
+            clock: SampleClock::new(period),
+            period,
+            heard: time::Instant::now(),
             present: false,
         }
     }
 
-    /// Present time, us.
-    pub fn now(&self) -> u64 {
+    /// Present time.
+    pub fn now(&self) -> Instant {
         match self {
-            Self::RealTime { started } => started.elapsed().as_micros() as u64,
+            Self::RealTime { started } => Instant::from_nanos(started.elapsed().as_nanos() as u64),
             Self::LockStep { clock, .. } => clock.now(),
         }
     }
@@ -58,19 +59,19 @@ impl Clock {
     pub fn restart(&mut self) {
         if let Self::LockStep {
             clock,
-            period_ns,
+            period,
             heard,
             present,
         } = self
         {
-            *clock = SampleClock::new(*period_ns);
-            *heard = Instant::now();
+            *clock = SampleClock::new(*period);
+            *heard = time::Instant::now();
             *present = true;
         }
     }
 
-    /// Looks at a frame before the node does.
-    pub fn observe(&mut self, frame: &CanFrame) {
+    /// Looks at a frame before the node does. Returns whether the node is to look at the time first.
+    pub fn observe(&mut self, frame: &CanFrame) -> bool {
         if let Self::LockStep {
             clock,
             heard,
@@ -79,10 +80,11 @@ impl Clock {
         } = self
             && is_feedback(frame)
         {
-            clock.observe(frame);
-            *heard = Instant::now();
+            *heard = time::Instant::now();
             *present = true;
+            return clock.observe(frame);
         }
+        false
     }
 
     /// Time passes without frames. Returns whether the node is to look at its watchdogs.
@@ -100,8 +102,8 @@ impl Clock {
                     return false;
                 }
                 *present = false;
-                *heard = Instant::now();
-                clock.elapse(silent.as_nanos() as u64);
+                *heard = time::Instant::now();
+                clock.elapse(Duration::from_nanos(silent.as_nanos() as u64));
                 true
             }
         }

@@ -15,6 +15,7 @@ use clap::Parser;
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::{ArmModel, IRB_930};
 use link::{Link, LinkAddress, realtime};
+use protocol::time::Period;
 
 use crate::clock::Clock;
 use crate::shell::Shell;
@@ -55,17 +56,16 @@ fn run(args: &Args) -> Result<(), String> {
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
         .map_err(|error| format!("cannot handle Ctrl-C: {error}"))?;
     let link = Link::open(&args.bus).map_err(|error| error.to_string())?;
-    let period_ns = (1e9 / f64::from(args.rate)).round();
+    let period = Period::of_rate(args.rate.into());
     let clock = if args.real_time {
         for refused in realtime::claim() {
             eprintln!("controller: {refused}");
         }
         Clock::real_time()
     } else {
-        Clock::lock_step(period_ns as u64)
+        Clock::lock_step(period)
     };
-    let config = Config::new(arm, (period_ns * 1e-9) as f32);
-    Shell::new(link, args.bus.to_string(), config, clock)
+    Shell::new(link, args.bus.to_string(), Config::new(arm, period), clock)
         .run(&stop)
         .map_err(|error| error.to_string())
 }

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant, SystemTime};
 use firmware::control::controller::Config;
 use firmware::node::Node;
 use link::{Link, LinkError, Stamped};
-use protocol::bus::{Bus, TransmitError};
 use protocol::frame::CanFrame;
 use protocol::messages::{Mode, Node as Name, ResetReason};
 use protocol::table;
@@ -65,7 +64,7 @@ pub struct Shell {
 impl Shell {
     pub fn new(link: Link, bus: String, config: Config, clock: Clock) -> Self {
         let deadline =
-            matches!(clock, Clock::RealTime { .. }).then(|| Duration::from_secs_f32(config.period));
+            matches!(clock, Clock::RealTime { .. }).then(|| config.period.duration().into());
         Self {
             node: Node::new(config, ResetReason::PowerOn),
             link,
@@ -125,8 +124,10 @@ impl Shell {
     fn take(&mut self, stamped: &Stamped) -> Result<(), ShellError> {
         let frame = &stamped.frame;
         self.refuse_duplicate(frame)?;
-        self.clock.observe(frame);
-        self.poll(Some(*frame));
+        if self.clock.observe(frame) {
+            self.poll(None);
+        }
+        self.poll(Some(frame));
         if self.node.reset_asked() {
             eprintln!("controller: reset by network management");
             self.node = Node::new(self.config, ResetReason::Software);
@@ -140,12 +141,8 @@ impl Shell {
     }
 
     /// Lets the node look at one frame, or at the time alone.
-    fn poll(&mut self, received: Option<CanFrame>) {
-        let mut port = Port {
-            received,
-            link: &mut self.link,
-        };
-        self.node.poll(self.clock.now(), &mut port);
+    fn poll(&mut self, received: Option<&CanFrame>) {
+        self.node.poll(self.clock.now(), received, &mut self.link);
         let controller = self.node.controller();
         if controller.mode() != self.mode {
             self.mode = controller.mode();
@@ -192,21 +189,5 @@ impl Shell {
             }),
             _ => Ok(()),
         }
-    }
-}
-
-/// The bus as the node sees it in one call: at most the frame that is due.
-struct Port<'a> {
-    received: Option<CanFrame>,
-    link: &'a mut Link,
-}
-
-impl Bus for Port<'_> {
-    fn receive(&mut self) -> Option<CanFrame> {
-        self.received.take()
-    }
-
-    fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
-        self.link.transmit(frame)
     }
 }

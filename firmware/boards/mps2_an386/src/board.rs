@@ -21,9 +21,10 @@ use firmware::cabinet::reset::Stop;
 use firmware::control::controller::Config;
 use firmware::control::phase::Probe;
 use firmware::node::Node;
-use protocol::bus::{Bus, TransmitError};
+use protocol::bus::{Transmit, TransmitError};
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
+use protocol::time::Instant;
 
 pub use host::End;
 use host::File;
@@ -75,7 +76,7 @@ fn start(setup: &mut Option<Setup>, node: &mut Option<Node>, reply: &mut Reply) 
     match setup.channel {
         Channel::Fifo => serve(&input, &output, node, &mut pins, &mut journal, reply),
         Channel::Uart => {
-            adapter::serve(node, &mut pins, &mut journal, setup.period_ns());
+            adapter::serve(node, &mut pins, &mut journal, setup.config.period);
             reply.clear();
             output.write(reply.finish(&(uart::RECEIVED.lost() as u32).into()))
         }
@@ -111,7 +112,7 @@ fn serve(
         reply.clear();
         let measured = match Request::from_bytes(&record).ok_or(End)? {
             Request::Poll { now, frame } => {
-                let measured = poll::<crate::Image>(node, now, frame, reply);
+                let measured = poll::<crate::Image>(node, now, frame.as_ref(), reply);
                 settle(node, now, pins, journal);
                 measured
             }
@@ -129,14 +130,14 @@ fn serve(
 /// Calls the node; returns the timer ticks it took, up to 2^24.
 fn poll<I: Image>(
     node: &mut Node,
-    now: u64,
-    received: Option<CanFrame>,
+    now: Instant,
+    received: Option<&CanFrame>,
     reply: &mut Reply,
 ) -> Measured {
-    let mut port = Port { received, reply };
+    let mut port = Port(reply);
     let before = SYST::get_current();
     let mut meter = I::Meter::default();
-    node.poll_with(now, &mut port, &mut meter);
+    node.poll_with(now, received, &mut port, &mut meter);
     Measured {
         number: ticks_since(before),
         ..meter.into()
@@ -149,14 +150,14 @@ pub fn ticks_since(before: u32) -> u32 {
 }
 
 /// What comes after every call of the node: a reset if it was asked for, the pins, the log.
-fn settle(node: &Node, now: u64, pins: &mut Pins, journal: &mut Journal) {
+fn settle(node: &Node, now: Instant, pins: &mut Pins, journal: &mut Journal) {
     if node.reset_asked() {
         cortex_m4::restart(ResetReason::Software);
     }
     let controller = node.controller();
     // These pins cannot fail.
     let _ = pins.show(controller.mode(), controller.control_word());
-    log::NOW.store((now / 1000) as u32, Ordering::Relaxed);
+    log::NOW.store(now.millis() as u32, Ordering::Relaxed);
     journal.note(controller);
 }
 
@@ -168,19 +169,12 @@ fn start_timer(timer: &mut SYST) {
     timer.enable_counter();
 }
 
-/// The node's end of the channel.
-struct Port<'a> {
-    received: Option<CanFrame>,
-    reply: &'a mut Reply,
-}
+/// The node's way out: the answer to the host.
+struct Port<'a>(&'a mut Reply);
 
-impl Bus for Port<'_> {
-    fn receive(&mut self) -> Option<CanFrame> {
-        self.received.take()
-    }
-
+impl Transmit for Port<'_> {
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
-        self.reply.push(frame)
+        self.0.push(frame)
     }
 }
 

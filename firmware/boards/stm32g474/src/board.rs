@@ -16,6 +16,7 @@ use firmware::cabinet::pins::Cabinet;
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
 use firmware::node::Node;
+use protocol::bus::Bus as _;
 use protocol::messages::ResetReason;
 
 use can::{Can, Port, Received, ToSend};
@@ -61,7 +62,8 @@ fn main() -> ! {
         }
         if ticked || port.has_frames() {
             let before = DWT::cycle_count();
-            node.poll(clock.now(), &mut port);
+            let received = port.receive();
+            node.poll(clock.now(), received.as_ref(), &mut port);
             let cycles = DWT::cycle_count().wrapping_sub(before);
             node.note_tick(cycles);
             if cycles > CYCLES_PER_TICK {

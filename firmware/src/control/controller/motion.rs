@@ -55,7 +55,7 @@ impl Controller {
         let (reference, progress) = self.queue.advance(
             &self.config.arm,
             steps,
-            self.config.period,
+            self.config.period.seconds(),
             stopping,
             &self.reference.q,
         );

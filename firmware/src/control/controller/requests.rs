@@ -100,7 +100,7 @@ impl Controller {
                     damping: *damping,
                     observer: *observer,
                 };
-                gains.check(self.config.period)?;
+                gains.check(self.config.period.seconds())?;
                 self.config.selection.gains = gains;
                 self.memory = Memory::new();
                 Answer::Now

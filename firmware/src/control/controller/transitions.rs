@@ -12,7 +12,7 @@ use crate::control::states::{Event, Halt, State};
 impl Controller {
     /// Takes the transition that the state has for `event`; returns whether there is one.
     pub fn event(&mut self, event: Event) -> bool {
-        let brake = (self.config.brake_delay / self.config.period) as u32 + 1;
+        let brake = (self.config.brake_delay / self.config.period.seconds()) as u32 + 1;
         let Some(next) = self.state.after(event, brake) else {
             return false;
         };
@@ -62,7 +62,7 @@ impl Controller {
     /// A gap in the feedback: bridged if it is short.
     pub(super) fn bridge(&mut self, steps: u32) {
         if steps > self.max_gap {
-            let gap = steps as f32 * self.config.period * 1e3;
+            let gap = steps as f32 * self.config.period.seconds() * 1e3;
             let fault = Fault::value(Cause::FeedbackLost, gap, MAX_GAP_MS as f32);
             self.fail(fault);
         } else if self.state.is_powered() {
@@ -80,7 +80,7 @@ impl Controller {
         }
         let error = self.reference.q - q;
         // The reference of the last sample: at most one sample of motion older than `q`.
-        let moved = self.reference.qd * self.config.period;
+        let moved = self.reference.qd * self.config.period.seconds();
         if let Some(fault) = self.monitor.check(q, qd, &(error + moved)) {
             self.fail(fault);
         }

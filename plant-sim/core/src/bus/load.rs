@@ -36,7 +36,7 @@ pub fn worst_case_load(timing: &BitTiming, profile: &[Traffic]) -> f64 {
         .iter()
         .map(|traffic| {
             let bits = FrameBits::worst_case(&traffic.frame);
-            timing.duration(bits) as f64 * 1e-9 * traffic.rate
+            timing.duration(bits).seconds() * traffic.rate
         })
         .sum()
 }

@@ -83,12 +83,6 @@ impl Setup {
     pub fn from_bytes(bytes: &[u8; SETUP_LEN]) -> Option<Self> {
         postcard::from_bytes(bytes).ok()
     }
-
-    /// Sampling period, ns, for a clock that counts samples: both ends have the same one.
-    #[must_use]
-    pub fn period_ns(&self) -> u64 {
-        u64::from((self.config.period * 1e9 + 0.5) as u32)
-    }
 }
 
 /// Writes `part` at `at`; what does not fit is left out.

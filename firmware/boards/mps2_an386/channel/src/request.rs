@@ -1,11 +1,12 @@
 //! What the host asks the board for.
 
 use protocol::frame::CanFrame;
+use protocol::time::Instant;
 
 use crate::frames::{FRAME_LEN, frame_from_bytes, frame_to_bytes};
 use crate::put;
 
-/// Bytes of a request: kind (1), time (8), frame.
+/// Bytes of a request: kind (1), time in ns (8), frame.
 pub const REQUEST_LEN: usize = 9 + FRAME_LEN;
 
 /// What the host asks for.
@@ -13,8 +14,8 @@ pub const REQUEST_LEN: usize = 9 + FRAME_LEN;
 pub enum Request {
     /// Call the node. The answer holds what it sent, and the timer ticks that it took.
     Poll {
-        /// Time, µs.
-        now: u64,
+        /// Time.
+        now: Instant,
         /// The frame that has come, if any.
         frame: Option<CanFrame>,
     },
@@ -73,14 +74,14 @@ impl Request {
         match self {
             Self::Poll { now, frame: None } => {
                 put(&mut bytes, 0, &[POLL]);
-                put(&mut bytes, 1, &now.to_le_bytes());
+                put(&mut bytes, 1, &now.nanos().to_le_bytes());
             }
             Self::Poll {
                 now,
                 frame: Some(frame),
             } => {
                 put(&mut bytes, 0, &[POLL_WITH_FRAME]);
-                put(&mut bytes, 1, &now.to_le_bytes());
+                put(&mut bytes, 1, &now.nanos().to_le_bytes());
                 put(&mut bytes, 9, &frame_to_bytes(frame));
             }
             Self::Stack => put(&mut bytes, 0, &[STACK]),
@@ -94,7 +95,7 @@ impl Request {
     pub fn from_bytes(bytes: &[u8; REQUEST_LEN]) -> Option<Self> {
         let (&kind, rest) = bytes.split_first()?;
         let (now, record) = rest.split_first_chunk()?;
-        let now = u64::from_le_bytes(*now);
+        let now = Instant::from_nanos(u64::from_le_bytes(*now));
         match kind {
             POLL => Some(Self::Poll { now, frame: None }),
             POLL_WITH_FRAME => {

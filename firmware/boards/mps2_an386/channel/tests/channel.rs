@@ -12,6 +12,7 @@ use proptest::prelude::*;
 use protocol::bus::TransmitError;
 use protocol::frame::{CanFrame, ExtendedId, Id, StandardId};
 use protocol::messages::ResetReason;
+use protocol::time::{Instant, Period};
 
 fn any_frame() -> impl Strategy<Value = CanFrame> {
     let id = prop_oneof![
@@ -41,6 +42,7 @@ proptest! {
 
     #[test]
     fn every_request_comes_back(now: u64, frame in proptest::option::of(any_frame())) {
+        let now = Instant::from_nanos(now);
         let request = Request::Poll { now, frame };
         prop_assert_eq!(Request::from_bytes(&request.to_bytes()), Some(request));
     }
@@ -68,9 +70,7 @@ fn frames_have_the_layout_of_linux() {
 
 #[test]
 fn the_configuration_comes_back_to_the_bit() {
-    let mut config = Config::new(IRB_930, 1e-3);
-    let channel = Channel::Uart;
-    assert_eq!(Setup { channel, config }.period_ns(), 1_000_000);
+    let mut config = Config::new(IRB_930, Period::of_rate(1000.0));
     config.command_delay = 2.345e-4;
     config.arm.geometry.a2 = f32::from_bits(0x3EFA_E148);
     for channel in [Channel::Fifo, Channel::Uart] {

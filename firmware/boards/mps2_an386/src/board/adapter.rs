@@ -1,16 +1,18 @@
 //! The board as a serial-line CAN adapter with a controller behind it.
 //!
 //! A frame is acknowledged by an empty line once the controller has looked at it; the frames it sent come before. So a
-//! host in lock-step knows when all is said. Time is that of the drives' samples.
+//! host in lock-step knows when all is said; so is the opening of the bus, after what a node says when it starts. Time is
+//! that of the drives' samples.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use firmware::cabinet::journal::Journal;
 use firmware::cabinet::sample_clock::SampleClock;
 use firmware::node::Node;
-use protocol::bus::{Bus, TransmitError};
+use protocol::bus::{Transmit, TransmitError};
 use protocol::frame::CanFrame;
 use protocol::slcan::{Line, Parser, Text};
+use protocol::time::Period;
 
 use super::pins::Pins;
 use super::settle;
@@ -31,21 +33,25 @@ pub fn wrapped() {
 
 /// Speaks slcan until the host closes the bus or is silent for [`SILENCE`].
 #[inline(never)]
-pub fn serve(node: &mut Node, pins: &mut Pins, journal: &mut Journal, period_ns: u64) {
-    let mut clock = SampleClock::new(period_ns);
+pub fn serve(node: &mut Node, pins: &mut Pins, journal: &mut Journal, period: Period) {
+    let mut clock = SampleClock::new(period);
     let mut parser = Parser::new();
     let mut open = false;
     while let Some(byte) = next_byte() {
         let answer = match parser.push(byte) {
             None => continue,
             Some(Ok(Line::Frame(frame))) if open => {
-                clock.observe(&frame);
-                node.poll(clock.now(), &mut Port(Some(frame)));
+                if clock.observe(&frame) {
+                    node.poll(clock.now(), None, &mut Uart);
+                }
+                node.poll(clock.now(), Some(&frame), &mut Uart);
                 settle(node, clock.now(), pins, journal);
                 Line::Empty
             }
             Some(Ok(Line::Open)) => {
                 open = true;
+                node.poll(clock.now(), None, &mut Uart);
+                settle(node, clock.now(), pins, journal);
                 Line::Empty
             }
             Some(Ok(Line::Close)) if open => return,
@@ -76,14 +82,10 @@ fn next_byte() -> Option<u8> {
     None
 }
 
-/// The node's end of the line: the frame that has come, and the UART.
-struct Port(Option<CanFrame>);
+/// The node's way out.
+struct Uart;
 
-impl Bus for Port {
-    fn receive(&mut self) -> Option<CanFrame> {
-        self.0.take()
-    }
-
+impl Transmit for Uart {
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
         FRAMES.send(Text::from(Line::Frame(*frame)).as_bytes());
         Ok(())

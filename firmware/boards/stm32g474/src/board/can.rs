@@ -15,7 +15,7 @@ use embassy_stm32::can::{
 };
 use embassy_stm32::peripherals::{FDCAN1, PA11, PA12};
 use embassy_stm32::{Peri, bind_interrupts, pac};
-use protocol::bus::{Bus, TransmitError};
+use protocol::bus::{Bus, Transmit, TransmitError};
 use protocol::codec;
 use protocol::frame::{CanFrame, FrameKind, StandardId};
 use protocol::messages::{EStop, EStopReason, Message};
@@ -181,7 +181,9 @@ impl Bus for Port {
         self.has_frames();
         self.next.take()
     }
+}
 
+impl Transmit for Port {
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
         let mode = self.can.driver.properties().bus_error_mode();
         let offline = matches!(mode, BusErrorMode::BusOff);

@@ -8,13 +8,12 @@ use embassy_stm32::rcc::{
     Hse, HseMode, Pll, PllMul, PllPreDiv, PllQDiv, PllRDiv, PllSource, Sysclk, mux,
 };
 use embassy_stm32::time::Hertz;
+use protocol::time::{Instant, Period};
 
-/// Period of the timer and of the drives' samples, s.
-pub const TICK: f32 = 1e-3;
+/// Period of the timer and of the drives' samples.
+pub const TICK: Period = Period::of_rate(1000.0);
 /// Cycles of the core in a period.
 pub const CYCLES_PER_TICK: u32 = 160_000;
-/// Same in us.
-const TICK_US: u64 = 1000;
 
 /// Periods since the start.
 pub static TICKS: AtomicU32 = AtomicU32::new(0);
@@ -45,7 +44,7 @@ pub fn config() -> embassy_stm32::Config {
 /// What time it is for the node. A resolution of one sample is enough: the node measures time-outs of many.
 pub struct Clock {
     seen: u32,
-    now: u64,
+    now: Instant,
 }
 
 impl Clock {
@@ -60,7 +59,10 @@ impl Clock {
             core.SYST.enable_interrupt();
             core.SYST.enable_counter();
         }
-        Self { seen: 0, now: 0 }
+        Self {
+            seen: 0,
+            now: Instant::ORIGIN,
+        }
     }
 
     /// Whether the timer has fired and has not been looked at.
@@ -73,12 +75,12 @@ impl Clock {
         let ticks = TICKS.load(Ordering::Relaxed);
         let passed = ticks.wrapping_sub(self.seen);
         self.seen = ticks;
-        self.now = self.now.saturating_add(u64::from(passed) * TICK_US);
+        self.now += TICK.duration() * passed;
         passed != 0
     }
 
-    /// Time noted last, us.
-    pub fn now(&self) -> u64 {
+    /// Time noted last.
+    pub fn now(&self) -> Instant {
         self.now
     }
 }

@@ -1,0 +1,126 @@
+//! The controller as a part of this process.
+
+use firmware::cabinet::sample_clock::SampleClock;
+use firmware::control::controller::Config;
+use firmware::node::Node;
+use protocol::frame::CanFrame;
+use protocol::messages::ResetReason;
+use protocol::table;
+use protocol::time::{Duration, Instant};
+
+use crate::observer::Mind;
+use crate::peer::{Outbox, Peer, PeerError, World};
+
+/// Time that a controller takes from frame in to frames out: 4000 instructions, the budget of a call, at 100 MHz.
+pub const COMPUTE: Duration = Duration::from_micros(40);
+
+/// Samples without feedback after which the controller is called without a frame: its watchdogs live on that.
+const GUARD_SAMPLES: u32 = 2;
+
+/// The controller as a part of this process.
+///
+/// It counts time in samples, as every controller in lock-step does ([`SampleClock`]): the same frames then lead to the same
+/// answers, in this process, in another and on a board. Where feedback stays away, the time of the caller goes on for it.
+#[derive(Debug)]
+pub struct InProcess {
+    config: Config,
+    node: Node,
+    clock: SampleClock,
+    /// When the last feedback came, or the time was looked at.
+    last: Option<Instant>,
+    /// What a call has sent, empty in between.
+    sent: Vec<CanFrame>,
+}
+
+impl InProcess {
+    /// A controller that network management has reset: so every run begins, wherever the controller is.
+    pub fn new(config: Config) -> Self {
+        Self::started(config, ResetReason::Software)
+    }
+
+    fn started(config: Config, reason: ResetReason) -> Self {
+        Self {
+            config,
+            node: Node::new(config, reason),
+            clock: SampleClock::new(config.period),
+            last: None,
+            sent: Vec::new(),
+        }
+    }
+
+    /// Starts the controller again, for this reason.
+    pub fn restart(&mut self, reason: ResetReason) {
+        *self = Self::started(self.config, reason);
+    }
+
+    /// The node.
+    pub fn node(&self) -> &Node {
+        &self.node
+    }
+
+    /// Present time of the node.
+    pub fn now(&self) -> Instant {
+        self.clock.now()
+    }
+
+    /// Whether it has started and has not been called yet.
+    pub fn is_new(&self) -> bool {
+        self.last.is_none()
+    }
+
+    /// When it is to be called without a frame, on the caller's time line.
+    pub fn due(&self) -> Instant {
+        match self.last {
+            None => Instant::ORIGIN,
+            Some(last) => last + self.config.period.duration() * GUARD_SAMPLES,
+        }
+    }
+
+    /// Calls the node at `now` of the caller; appends what it sends. A node that is asked to reset is followed by a new one.
+    pub fn call(&mut self, now: Instant, received: Option<&CanFrame>, sent: &mut Vec<CanFrame>) {
+        // Never full: the caller takes everything at once.
+        let mut send = |frame: &CanFrame| {
+            sent.push(*frame);
+            Ok(())
+        };
+        match received {
+            None => {
+                let last = self.last.replace(now);
+                self.clock.elapse(now.since(last.unwrap_or(now)));
+            }
+            Some(frame) => {
+                if table::FEEDBACK.identifies(frame) {
+                    self.last = Some(now);
+                }
+                if self.clock.observe(frame) {
+                    self.node.poll(self.clock.now(), None, &mut send);
+                }
+            }
+        }
+        self.node.poll(self.clock.now(), received, &mut send);
+        if self.node.reset_asked() {
+            self.restart(ResetReason::Software);
+        }
+    }
+}
+
+impl Peer for InProcess {
+    fn wake(&self) -> Option<Instant> {
+        Some(self.due())
+    }
+
+    fn poll(
+        &mut self,
+        now: Instant,
+        received: Option<&CanFrame>,
+        world: &mut World,
+        out: &mut Outbox,
+    ) -> Result<(), PeerError> {
+        let mut sent = std::mem::take(&mut self.sent);
+        self.call(now, received, &mut sent);
+        out.extend(sent.drain(..).map(|frame| (now + COMPUTE, frame)));
+        self.sent = sent;
+        world.mind = Mind::of(&self.node);
+        Ok(())
+    }
+}

@@ -1,0 +1,157 @@
+//! What is shown of a run as it goes, and to whom.
+
+use std::io;
+
+use firmware::node::Node;
+use protocol::frame::CanFrame;
+use protocol::messages::Mode;
+use protocol::time::Instant;
+
+use crate::operator::Hand;
+use crate::plant::Plant;
+
+/// One sample as it truly was, and what the controller wanted it to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// The robot.
+    pub plant: PlantState,
+    /// The controller.
+    pub mind: Mind,
+}
+
+/// The robot at the instant of a sample. Joints in order: shoulder, elbow, lift, wrist (rad, m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlantState {
+    /// Time of the sample, s.
+    pub t: f64,
+    /// Joint positions, rad and m.
+    pub q: [f64; 4],
+    /// Joint speeds, rad/s and m/s.
+    pub qd: [f64; 4],
+    /// Efforts at the joints, N m and N.
+    pub tau: [f64; 4],
+    /// Flange in frame 0: x, y, z (m), yaw (rad).
+    pub tool: [f64; 4],
+    /// Whether a motor is asked for more torque than it can give.
+    pub saturated: bool,
+}
+
+impl PlantState {
+    /// The state of a robot that has been moved on to `now`.
+    pub fn of(plant: &Plant, now: Instant) -> Self {
+        let pose = plant.pose();
+        Self {
+            t: now.seconds(),
+            q: plant.q(),
+            qd: plant.qd(),
+            tau: plant.joint_effort(),
+            tool: [pose.x, pose.y, pose.z, pose.yaw],
+            saturated: plant.is_saturated(),
+        }
+    }
+}
+
+/// What a controller has in mind when it has answered a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mind {
+    /// Reference: joint positions, rad and m.
+    pub q: [f64; 4],
+    /// Reference: joint speeds, rad/s and m/s.
+    pub qd: [f64; 4],
+    /// State of the cabinet.
+    pub mode: Mode,
+}
+
+impl Mind {
+    /// Before a controller has started.
+    pub const BLANK: Self = Self {
+        q: [0.0; 4],
+        qd: [0.0; 4],
+        mode: Mode::Boot,
+    };
+
+    /// What this node has in mind.
+    pub fn of(node: &Node) -> Self {
+        let controller = node.controller();
+        let four = |v: &nalgebra::Vector4<f32>| [v.x, v.y, v.z, v.w].map(f64::from);
+        Self {
+            q: four(&controller.reference().q),
+            qd: four(&controller.reference().qd),
+            mode: controller.mode(),
+        }
+    }
+}
+
+/// What is shown of a run as it goes. An observer looks at what it cares for; a pair of observers is one.
+pub trait Observer {
+    /// A frame was delivered.
+    ///
+    /// # Errors
+    /// Output failed; the run ends.
+    fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        let _ = (time, frame);
+        Ok(())
+    }
+
+    /// A sample has been answered.
+    ///
+    /// # Errors
+    /// Output failed; the run ends.
+    fn sample(&mut self, truth: &Truth) -> io::Result<()> {
+        let _ = truth;
+        Ok(())
+    }
+
+    /// A cycle begins or ends.
+    fn hand(&mut self, hand: &Hand) {
+        let _ = hand;
+    }
+}
+
+impl Observer for () {}
+
+impl<O: Observer> Observer for &mut O {
+    fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        (**self).frame(time, frame)
+    }
+
+    fn sample(&mut self, truth: &Truth) -> io::Result<()> {
+        (**self).sample(truth)
+    }
+
+    fn hand(&mut self, hand: &Hand) {
+        (**self).hand(hand);
+    }
+}
+
+impl<A: Observer, B: Observer> Observer for (A, B) {
+    fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        self.0.frame(time, frame)?;
+        self.1.frame(time, frame)
+    }
+
+    fn sample(&mut self, truth: &Truth) -> io::Result<()> {
+        self.0.sample(truth)?;
+        self.1.sample(truth)
+    }
+
+    fn hand(&mut self, hand: &Hand) {
+        self.0.hand(hand);
+        self.1.hand(hand);
+    }
+}
+
+/// What slows a run down; `()` lets it go as fast as it can.
+pub trait Pace {
+    /// Called before the sample that is due at `now` is taken.
+    ///
+    /// # Errors
+    /// There is nothing to wait for any more; the run ends.
+    fn sample(&mut self, now: Instant) -> io::Result<()>;
+}
+
+impl Pace for () {
+    fn sample(&mut self, _: Instant) -> io::Result<()> {
+        Ok(())
+    }
+}

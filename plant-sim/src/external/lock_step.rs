@@ -1,0 +1,152 @@
+//! Lock-step: the plant waits for each answer.
+
+use std::time;
+
+use firmware::control::controller::Config;
+use link::LinkAddress;
+use protocol::bus::Bus as _;
+use protocol::frame::CanFrame;
+use protocol::messages::Node as Name;
+use protocol::table;
+use protocol::time::Instant;
+use sim::controller::COMPUTE;
+use sim::observer::Mind;
+use sim::peer::{Outbox, Peer, PeerError, World};
+
+use super::peers::{self, sender};
+use super::{ANSWER_LIMIT, Remote};
+use crate::twin::Twin;
+
+/// A controller behind a link, in lock-step with the rig.
+pub struct LockStep {
+    remote: Remote,
+    twin: Twin,
+    /// Whether the first command has come: what a controller says before it may belong to its past.
+    begun: bool,
+    /// Whether the twin still knows all that the controller knows.
+    follows: bool,
+    period: time::Duration,
+    /// What the controller has sent, empty between calls.
+    sent: Vec<CanFrame>,
+}
+
+impl LockStep {
+    /// Waits for a controller on the bus and makes it start afresh.
+    ///
+    /// # Errors
+    /// The bus cannot be used, another plant is on it, or no controller answers within a minute.
+    pub fn connect(address: &LinkAddress, config: Config) -> Result<Self, PeerError> {
+        Ok(Self {
+            remote: peers::meet(address)?,
+            twin: Twin::new(config),
+            begun: false,
+            follows: true,
+            period: config.period.duration().into(),
+            sent: Vec::new(),
+        })
+    }
+
+    /// Takes what has come; the controller's frames are compared and handed on.
+    fn take(&mut self) -> Result<(), PeerError> {
+        while let Some(frame) = self.remote.link.receive() {
+            match sender(&frame) {
+                Some(Name::Controller) => self.answer(&frame)?,
+                Some(Name::Drives | Name::Operator) => {
+                    return Err(self.remote.second_plant(&frame));
+                }
+                // Somebody else has spoken, an emergency stop perhaps, and only the controller knows when it heard it.
+                None => self.follows = false,
+            }
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, frame: &CanFrame) -> Result<(), PeerError> {
+        let command = table::COMMAND.identifies(frame);
+        if !self.begun && !command {
+            return Ok(());
+        }
+        self.begun = true;
+        self.remote.refuse_restart(frame, self.twin.node())?;
+        if self.follows {
+            self.twin.compare(frame).map_err(|difference| {
+                self.remote.error(format!(
+                    "differs from its twin in this process {}: {difference}. Both must be built from one source and \
+                     have one robot (--model) and one rate (--rate); a controller in real time needs a plant in real \
+                     time (--real-time)",
+                    self.place()
+                ))
+            })?;
+        } else if command {
+            self.twin.due().clear();
+        }
+        self.sent.push(*frame);
+        Ok(())
+    }
+
+    fn place(&self) -> String {
+        let ms = self.twin.controller().now().millis();
+        format!("at {}.{:03} s", ms / 1000, ms % 1000)
+    }
+
+    /// What a controller says when it starts cannot be told from what it said before: the twin says it.
+    fn start(&mut self, now: Instant) {
+        self.twin.call(now, None);
+        self.sent.extend(self.twin.due().drain(..));
+    }
+
+    /// Hands a frame over and waits for all that the twin answers.
+    fn exchange(&mut self, now: Instant, frame: &CanFrame) -> Result<(), PeerError> {
+        self.twin.call(now, Some(frame));
+        self.remote.send(frame)?;
+        let patience = if self.follows {
+            ANSWER_LIMIT
+        } else {
+            self.period
+        };
+        let limit = time::Instant::now() + patience;
+        self.take()?;
+        while !self.twin.due().is_empty() {
+            let left = limit.saturating_duration_since(time::Instant::now());
+            if left.is_zero() {
+                if self.follows {
+                    eprintln!(
+                        "plant-sim: the controller on {} is late {}: no answer to {frame} within {} s; going on",
+                        self.remote.bus,
+                        self.place(),
+                        ANSWER_LIMIT.as_secs()
+                    );
+                    self.follows = false;
+                }
+                self.twin.due().clear();
+                break;
+            }
+            self.remote.wait(left)?;
+            self.take()?;
+        }
+        Ok(())
+    }
+}
+
+impl Peer for LockStep {
+    fn wake(&self) -> Option<Instant> {
+        // Between samples there is nothing that a link could say about the time.
+        self.twin.controller().is_new().then_some(Instant::ORIGIN)
+    }
+
+    fn poll(
+        &mut self,
+        now: Instant,
+        received: Option<&CanFrame>,
+        world: &mut World,
+        out: &mut Outbox,
+    ) -> Result<(), PeerError> {
+        match received {
+            None => self.start(now),
+            Some(frame) => self.exchange(now, frame)?,
+        }
+        out.extend(self.sent.drain(..).map(|frame| (now + COMPUTE, frame)));
+        world.mind = Mind::of(self.twin.node());
+        Ok(())
+    }
+}

@@ -1,0 +1,89 @@
+//! Real time as a pace: samples at absolute deadlines of the machine's clock.
+
+use std::cell::{Ref, RefCell};
+use std::io;
+use std::rc::Rc;
+use std::time::Duration;
+
+use link::realtime::{monotonic, sleep_until};
+use protocol::time::{Instant, Period};
+use sim::observer::Pace;
+
+use super::timing::Timing;
+
+/// Time between the end of the preparations and the first sample.
+const RUN_UP: Duration = Duration::from_millis(5);
+
+/// The pace of a real-time run, shared with the controller's end, which has until the next sample for its answer.
+#[derive(Clone)]
+pub struct WallClock(Rc<RefCell<Samples>>);
+
+struct Samples {
+    period: Duration,
+    /// Time of sample 0 on the machine's clock.
+    origin: Option<Duration>,
+    /// Number of the present sample.
+    number: u32,
+    timing: Timing,
+}
+
+impl WallClock {
+    /// Before the first sample.
+    pub fn new(period: Period) -> Self {
+        let period = period.duration().into();
+        Self(Rc::new(RefCell::new(Samples {
+            period,
+            origin: None,
+            number: 0,
+            timing: Timing::new(period),
+        })))
+    }
+
+    /// What was measured so far.
+    pub fn timing(&self) -> Ref<'_, Timing> {
+        Ref::map(self.0.borrow(), |samples| &samples.timing)
+    }
+
+    /// Number of the present sample.
+    pub fn sample(&self) -> u32 {
+        self.0.borrow().number
+    }
+
+    /// When the next sample is due.
+    pub fn deadline(&self) -> Duration {
+        let samples = self.0.borrow();
+        samples.origin.unwrap_or_default() + samples.period * (samples.number + 1)
+    }
+
+    /// The command of the present sample came this long after its feedback.
+    pub fn answered(&self, latency: Duration) {
+        self.0.borrow_mut().timing.answered(latency);
+    }
+
+    /// The command of the present sample had not come when the next was due.
+    pub fn missed(&self) {
+        self.0.borrow_mut().timing.missed();
+    }
+}
+
+impl Pace for WallClock {
+    fn sample(&mut self, _: Instant) -> io::Result<()> {
+        let mut samples = self.0.borrow_mut();
+        let origin = match samples.origin {
+            Some(origin) => {
+                samples.number += 1;
+                origin
+            }
+            None => *samples.origin.insert(monotonic() + RUN_UP),
+        };
+        let deadline = origin + samples.period * samples.number;
+        sleep_until(deadline);
+        let now = monotonic();
+        samples.timing.woke(deadline, now);
+        if now >= deadline + samples.period {
+            // Samples that were missed are not made up for in a burst: time slips, and the controller gets its share.
+            samples.origin = Some(now.saturating_sub(samples.period * samples.number));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,68 @@
+//! A controller in this process that is given the same frames as another, which must then send the same.
+
+use std::collections::VecDeque;
+
+use firmware::control::controller::Config;
+use firmware::node::Node;
+use protocol::frame::CanFrame;
+use protocol::messages::ResetReason;
+use protocol::time::Instant;
+use sim::controller::InProcess;
+use trace::difference::Difference;
+
+/// The controller that others are held against.
+#[derive(Debug)]
+pub struct Twin {
+    controller: InProcess,
+    /// What it has sent and the other has not yet.
+    due: VecDeque<CanFrame>,
+    /// What a call has sent, empty in between.
+    sent: Vec<CanFrame>,
+}
+
+impl Twin {
+    /// A twin at the beginning of a run.
+    pub fn new(config: Config) -> Self {
+        Self {
+            controller: InProcess::new(config),
+            due: VecDeque::new(),
+            sent: Vec::new(),
+        }
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &InProcess {
+        &self.controller
+    }
+
+    /// The node.
+    pub fn node(&self) -> &Node {
+        self.controller.node()
+    }
+
+    /// Starts again, as the other did, for this reason.
+    pub fn restart(&mut self, reason: ResetReason) {
+        self.controller.restart(reason);
+        self.due.clear();
+    }
+
+    /// Does as the other does when it is called so.
+    pub fn call(&mut self, now: Instant, received: Option<&CanFrame>) {
+        self.controller.call(now, received, &mut self.sent);
+        self.due.extend(self.sent.drain(..));
+    }
+
+    /// Holds what the other has sent against what is due next.
+    ///
+    /// # Errors
+    /// They differ.
+    pub fn compare(&mut self, found: &CanFrame) -> Result<(), Difference> {
+        let due = self.due.pop_front();
+        Difference::between(due.as_ref(), Some(found)).map_or(Ok(()), Err)
+    }
+
+    /// What the other has still to send.
+    pub fn due(&mut self) -> &mut VecDeque<CanFrame> {
+        &mut self.due
+    }
+}

@@ -1,0 +1,70 @@
+//! The built-in bus, shown to CAN tools on a serial-line port.
+
+use std::cell::RefCell;
+use std::io;
+use std::rc::Rc;
+use std::time::Duration;
+
+use link::realtime::{monotonic, sleep_until};
+use link::{Clients, Link, LinkError, SlcanHub};
+use protocol::bus::Transmit as _;
+use protocol::frame::CanFrame;
+use protocol::time::Instant;
+use sim::observer::{Observer, Pace};
+
+/// Between two looks for a client.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Those who watch the bus of a run. As an observer they see its frames; as a pace they hold the run until the first of
+/// them is there, and then to the speed of the clock, so that a person can follow it.
+#[derive(Clone)]
+pub struct Viewers {
+    hub: Rc<RefCell<Link>>,
+    /// When the run began on the machine's clock.
+    origin: Option<Duration>,
+}
+
+impl Viewers {
+    /// Nobody yet, on `server`, `HOST:PORT`.
+    ///
+    /// # Errors
+    /// The port is taken or not this machine's.
+    pub fn bind(server: &str) -> Result<Self, LinkError> {
+        let hub = SlcanHub::bind(server, Clients::Watch)?;
+        Ok(Self {
+            hub: Rc::new(RefCell::new(Link::SlcanHub(hub))),
+            origin: None,
+        })
+    }
+
+    fn wait(&self) -> io::Result<()> {
+        let mut hub = self.hub.borrow_mut();
+        while !matches!(&*hub, Link::SlcanHub(hub) if hub.is_open()) {
+            hub.wait(PATIENCE).map_err(io::Error::other)?;
+        }
+        Ok(())
+    }
+}
+
+impl Observer for Viewers {
+    fn frame(&mut self, _: Instant, frame: &CanFrame) -> io::Result<()> {
+        // A hub takes every frame; clients that do not read lose it, and the run does not wait for them.
+        let _ = self.hub.borrow_mut().transmit(frame);
+        Ok(())
+    }
+}
+
+impl Pace for Viewers {
+    fn sample(&mut self, now: Instant) -> io::Result<()> {
+        let now = Duration::from_nanos(now.nanos());
+        match self.origin {
+            Some(origin) => sleep_until(origin + now),
+            None => {
+                eprintln!("plant-sim: waiting for a client");
+                self.wait()?;
+                self.origin = Some(monotonic().saturating_sub(now));
+            }
+        }
+        Ok(())
+    }
+}
