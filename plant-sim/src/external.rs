@@ -42,6 +42,11 @@ const ANSWER_LIMIT: Duration = Duration::from_secs(2);
 pub(crate) struct Remote {
     link: Link,
     bus: String,
+    /// Whether a controller has been met. From then on a lost link does not end the run: to the other nodes the controller
+    /// has fallen silent.
+    met: bool,
+    /// Why the link is of no use any more.
+    lost: Option<String>,
 }
 
 impl Remote {
@@ -58,17 +63,19 @@ impl Remote {
         ))
     }
 
-    fn send(&mut self, frame: &CanFrame) -> Result<(), PeerError> {
+    fn send(&mut self, frame: &CanFrame) {
         let limit = Instant::now() + ANSWER_LIMIT;
-        while let Err(error) = self.link.transmit(frame) {
+        while self.lost.is_none()
+            && let Err(error) = self.link.transmit(frame)
+        {
             if error == TransmitError::Offline || Instant::now() >= limit {
                 // The link knows more than the frame that was not taken.
-                self.wait(Duration::ZERO)?;
-                return Err(self.error(format!("cannot be reached: {error}")));
+                self.wait(Duration::ZERO);
+                self.lose(format!("cannot be reached: {error}"));
+            } else {
+                self.wait(Duration::from_millis(1));
             }
-            self.wait(Duration::from_millis(1))?;
         }
-        Ok(())
     }
 
     /// A controller that starts while its twin moves the arm has died in between: nothing of the run is left in it.
@@ -79,10 +86,23 @@ impl Remote {
         Ok(())
     }
 
-    fn wait(&mut self, timeout: Duration) -> Result<bool, PeerError> {
-        self.link
-            .wait(timeout)
-            .map_err(|error| self.error(format!("is out of reach: {error}")))
+    /// Waits for a frame; without one if the link is lost.
+    fn wait(&mut self, timeout: Duration) {
+        if self.lost.is_none()
+            && let Err(error) = self.link.wait(timeout)
+        {
+            self.lose(format!("is out of reach: {error}"));
+        }
+    }
+
+    fn lose(&mut self, why: String) {
+        if self.met && self.lost.is_none() {
+            eprintln!(
+                "plant-sim: the controller on {} {why}; going on without it",
+                self.bus
+            );
+        }
+        self.lost.get_or_insert(why);
     }
 }
 

@@ -58,7 +58,9 @@ impl Replay {
         let due = self.twin.due();
         due.retain(|frame| table::COMMAND.identifies(frame));
         match due.front() {
-            Some(&first) if due.len() > WAITING => Err(Difference::Missing { due: first }),
+            Some(first) if due.len() > WAITING => Err(Difference::Missing {
+                due: Box::new(*first),
+            }),
             _ => Ok(()),
         }
     }

@@ -3,7 +3,7 @@
 use std::net::TcpListener;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use firmware::cabinet::sample_clock::SampleClock;
@@ -65,6 +65,22 @@ fn controller(mut link: Link, period: Period, stop: &AtomicBool) {
     }
 }
 
+/// A controller on a link of its own: what ends it, and where it is found.
+fn serve(rate: f64) -> (Arc<AtomicBool>, LinkAddress, JoinHandle<()>) {
+    let port = TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .port();
+    let hub: LinkAddress = format!("slcan:listen:127.0.0.1:{port}").parse().unwrap();
+    let client = format!("slcan:tcp:127.0.0.1:{port}").parse().unwrap();
+    let link = Link::open(&hub).unwrap();
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    let thread = thread::spawn(move || controller(link, Period::of_rate(rate), &asked));
+    (stop, client, thread)
+}
+
 #[test]
 fn an_external_controller_moves_the_arm_by_the_same_bits() {
     for rate in [1000.0, 3000.0] {
@@ -75,17 +91,7 @@ fn an_external_controller_moves_the_arm_by_the_same_bits() {
         let mut here = Seen::default();
         in_process(&config, &mut here).unwrap();
 
-        let port = TcpListener::bind("127.0.0.1:0")
-            .unwrap()
-            .local_addr()
-            .unwrap()
-            .port();
-        let hub: LinkAddress = format!("slcan:listen:127.0.0.1:{port}").parse().unwrap();
-        let client: LinkAddress = format!("slcan:tcp:127.0.0.1:{port}").parse().unwrap();
-        let link = Link::open(&hub).unwrap();
-        let stop = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&stop);
-        let thread = thread::spawn(move || controller(link, Period::of_rate(rate), &asked));
+        let (stop, client, thread) = serve(rate);
         let mut there = Seen::default();
         let summary = with_controller(
             &config,
@@ -115,4 +121,33 @@ fn an_external_controller_moves_the_arm_by_the_same_bits() {
         }
         assert_eq!(replay.compared() as usize, there.truth.len());
     }
+}
+
+/// The link fails in the middle of the run: to the operator the controller is silent, and the arm has come to rest.
+#[test]
+fn a_controller_that_goes_away_is_a_result() {
+    let config = RunConfig::new(Scenario::built_in("gate").unwrap());
+    let (stop, client, thread) = serve(1000.0);
+    /// Ends the controller at this sample.
+    struct Ending<'a>(u32, &'a AtomicBool);
+    impl Observer for Ending<'_> {
+        fn sample(&mut self, _: &Truth) -> std::io::Result<()> {
+            self.0 = self.0.saturating_sub(1);
+            if self.0 == 0 {
+                self.1.store(true, Ordering::Relaxed);
+            }
+            Ok(())
+        }
+    }
+    let summary = with_controller(
+        &config,
+        |config| LockStep::connect(&client, config),
+        &mut (),
+        &mut Ending(450, &stop),
+    )
+    .unwrap();
+    thread.join().unwrap();
+    let error = summary.error.unwrap();
+    assert!(error.contains("silent since"), "{error}");
+    assert!(summary.at_rest);
 }

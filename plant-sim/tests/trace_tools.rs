@@ -466,7 +466,7 @@ fn replay_names_sample_and_field() {
     assert_eq!(
         replay(&records),
         Err(Difference::Field {
-            due: frame_of(&RUN.0[at]),
+            due: Box::new(frame_of(&RUN.0[at])),
             field: "torque_lift".into(),
             expected: original.to_string(),
             found: command.torque[2].to_string(),
@@ -476,12 +476,17 @@ fn replay_names_sample_and_field() {
     records[at].entry = RUN.0[at].entry;
     records.insert(at, records[at]);
     assert!(
-        matches!(replay(&records), Err(Difference::Surplus { found }) if found == frame_of(&records[at]))
+        matches!(replay(&records), Err(Difference::Surplus { found }) if *found == frame_of(&records[at]))
     );
     records.remove(at);
     records.retain(|record| !is_command(record));
     let first = frame_of(RUN.0.iter().find(|record| is_command(record)).unwrap());
-    assert_eq!(replay(&records), Err(Difference::Missing { due: first }));
+    assert_eq!(
+        replay(&records),
+        Err(Difference::Missing {
+            due: Box::new(first)
+        })
+    );
 }
 
 /// Every mode of the run and every axis is in the picture; an emergency stop is marked.

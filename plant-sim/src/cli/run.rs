@@ -373,6 +373,14 @@ fn report(results: &Results, out: &Path) -> String {
             }
         }
     }
+    if !summary.completed {
+        let rest = if summary.at_rest {
+            "at rest behind its brake"
+        } else {
+            "not at rest"
+        };
+        line!(text, "  arm in the end    {rest}");
+    }
     line!(
         text,
         "  simulated         {:.2} s in {:.3} s: {:.0} times real time",

@@ -31,20 +31,26 @@ pub fn meet(address: &LinkAddress) -> Result<Remote, PeerError> {
         who: format!("on {bus}"),
         what: format!("is out of reach: {error}"),
     })?;
-    let mut remote = Remote { link, bus };
+    let mut remote = Remote {
+        link,
+        bus,
+        met: false,
+        lost: None,
+    };
     hear(&mut remote, LISTEN, false)?;
     let began = Instant::now();
     let mut told = false;
     loop {
         // A waiting plant is heard by another that starts.
-        remote.send(&reset())?;
+        remote.send(&reset());
         if hear(&mut remote, RETRY, true)? {
             // Whether the controller has heard that or has just started by itself cannot be known: it starts afresh
             // now, and the first sample comes after.
-            remote.send(&reset())?;
+            remote.send(&reset());
             if told {
                 eprintln!("plant-sim: the controller is there");
             }
+            remote.met = true;
             return Ok(remote);
         }
         if began.elapsed() > MEET_LIMIT {
@@ -82,7 +88,10 @@ fn hear(remote: &mut Remote, time: Duration, controller: bool) -> Result<bool, P
         if left.is_zero() {
             return Ok(false);
         }
-        remote.wait(left)?;
+        remote.wait(left);
+        if let Some(why) = &remote.lost {
+            return Err(remote.error(why.clone()));
+        }
     }
 }
 

@@ -15,7 +15,7 @@ pub enum Difference {
     /// A field has another value.
     Field {
         /// The frame that was due.
-        due: CanFrame,
+        due: Box<CanFrame>,
         /// Field, or "counter".
         field: String,
         /// Value that was due.
@@ -26,26 +26,26 @@ pub enum Difference {
     /// The frame that came is damaged.
     Damaged {
         /// The frame that was due.
-        due: CanFrame,
+        due: Box<CanFrame>,
         /// What is wrong with the other.
         error: DecodeError,
     },
     /// Another message came.
     Other {
         /// The frame that was due.
-        due: CanFrame,
+        due: Box<CanFrame>,
         /// The frame that came.
-        found: CanFrame,
+        found: Box<CanFrame>,
     },
     /// Nothing came.
     Missing {
         /// The frame that was due.
-        due: CanFrame,
+        due: Box<CanFrame>,
     },
     /// A frame came that was not due.
     Surplus {
         /// The frame.
-        found: CanFrame,
+        found: Box<CanFrame>,
     },
 }
 
@@ -54,7 +54,8 @@ impl Difference {
     /// indicator belong to the link and do not count.
     #[must_use]
     pub fn between(due: Option<&CanFrame>, found: Option<&CanFrame>) -> Option<Self> {
-        match (due.copied(), found.copied()) {
+        let boxed = |frame: Option<&CanFrame>| frame.map(|frame| Box::new(*frame));
+        match (boxed(due), boxed(found)) {
             (None, None) => None,
             (Some(due), None) => Some(Self::Missing { due }),
             (None, Some(found)) => Some(Self::Surplus { found }),
@@ -67,7 +68,7 @@ impl Difference {
     }
 
     /// What differs in two frames of one message.
-    fn within(due: CanFrame, found: CanFrame) -> Self {
+    fn within(due: Box<CanFrame>, found: Box<CanFrame>) -> Self {
         let (expected, came) = match (Decoded::new(&due), Decoded::new(&found)) {
             (Ok(expected), Ok(came)) => (expected, came),
             (Ok(_), Err(error)) => return Self::Damaged { due, error },
