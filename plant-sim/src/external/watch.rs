@@ -39,6 +39,13 @@ impl<E: Endpoint> Watched<E> {
         })
     }
 
+    /// Answers clients, greets new ones and lets others go.
+    fn serve(&mut self) {
+        if let Link::SlcanHub(hub) = &mut self.hub {
+            hub.exchange();
+        }
+    }
+
     fn show(&mut self, frame: &CanFrame) {
         // A hub takes every frame; clients that do not read lose it, and the run does not wait for them.
         let _ = self.hub.transmit(frame);
@@ -61,6 +68,7 @@ impl<E: Endpoint> Endpoint for Watched<E> {
                 self.origin = Some(monotonic().saturating_sub(now_of_run));
             }
         }
+        self.serve();
         if let Some(frame) = received {
             self.show(frame);
         }
