@@ -2,7 +2,8 @@
 //!
 //! - Time does not run backwards.
 //! - Every frame of ours is one that the codec accepts: format, length, CRC, codes, ranges.
-//! - Every end-to-end counter counts one up; so does the sample number of the feedback.
+//! - Every end-to-end counter counts one up; so does the sample number of the feedback. A node that network management
+//!   resets starts anew.
 //! - A command echoes the newest feedback, and no feedback waits for its command until the next.
 //! - No message that comes at a rate stays away for longer than two and a half periods, no feedback for longer than the
 //!   controller's watchdog.
@@ -15,7 +16,7 @@ use firmware::node::PEER_TIMEOUT;
 use protocol::codec::{self, DecodeError};
 use protocol::e2e::{Receiver, Verdict};
 use protocol::frame::CanFrame;
-use protocol::messages::{Command, ControlWord, Message};
+use protocol::messages::{Command, ControlWord, Message, NmtCommand, Node};
 use protocol::schema::{MessageInfo, Rate};
 use protocol::table::{self, TABLE};
 
@@ -143,6 +144,28 @@ pub struct Counts {
     pub error_frames: u64,
 }
 
+impl Counts {
+    /// The sum of both.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            judged: self.judged + other.judged,
+            foreign: self.foreign + other.foreign,
+            error_frames: self.error_frames + other.error_frames,
+        }
+    }
+
+    /// What was counted since `before`.
+    #[must_use]
+    pub fn minus(self, before: Self) -> Self {
+        Self {
+            judged: self.judged - before.judged,
+            foreign: self.foreign - before.foreign,
+            error_frames: self.error_frames - before.error_frames,
+        }
+    }
+}
+
 /// One message of the table.
 struct Watch {
     info: &'static MessageInfo,
@@ -253,7 +276,30 @@ impl Checker {
         match received.message {
             Message::Feedback(feedback) => self.feedback(feedback.sample),
             Message::Command(command) => self.command(&command),
+            Message::Nmt(nmt) if nmt.command == NmtCommand::ResetNode => {
+                self.reset(nmt.node);
+                Ok(())
+            }
             _ => Ok(()),
+        }
+    }
+
+    /// The node of this number, or every one for 0, starts again: with its counters at their start, and in its own time.
+    fn reset(&mut self, node: u8) {
+        let is_it = |sender: Node| node == 0 || node == sender.code();
+        for watch in &mut self.messages {
+            if watch.info.sender.is_none_or(is_it) {
+                watch.seen_us = None;
+                if let Some(receiver) = &mut watch.receiver {
+                    receiver.reset();
+                }
+            }
+        }
+        if is_it(Node::Drives) {
+            self.sample = None;
+        }
+        if is_it(Node::Controller) {
+            self.commanded = false;
         }
     }
 

@@ -40,32 +40,41 @@ pub enum PlayError {
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     speed: f64,
-    /// Time of the first record, us.
-    origin: Option<u64>,
-    latest: Duration,
+    /// Longest step of time that is played.
+    longest: Duration,
+    /// Latest time of a record so far, us.
+    newest_us: Option<u64>,
+    /// Played time up to then, before it is divided by the speed.
+    recorded: Duration,
 }
 
 impl Pace {
-    /// `speed` times as fast as recorded; 0 leaves out every pause.
+    /// `speed` times as fast as recorded; 0 leaves out every pause. Steps of time longer than `skip` take none.
     #[must_use]
-    pub fn new(speed: f64) -> Self {
+    pub fn new(speed: f64, skip: Option<Duration>) -> Self {
         Self {
             speed,
-            origin: None,
-            latest: Duration::ZERO,
+            longest: skip.unwrap_or(Duration::MAX),
+            newest_us: None,
+            recorded: Duration::ZERO,
         }
     }
 
     /// Time after the first frame at which the one of this record is due: never before an earlier one, even where the
     /// clock of the trace was set back.
     pub fn due(&mut self, time_us: u64) -> Duration {
-        let origin = *self.origin.get_or_insert(time_us);
-        if self.speed > 0.0 {
-            let recorded = Duration::from_micros(time_us.saturating_sub(origin)).as_secs_f64();
-            let played = Duration::try_from_secs_f64(recorded / self.speed);
-            self.latest = self.latest.max(played.unwrap_or(Duration::MAX));
+        let newest_us = *self.newest_us.get_or_insert(time_us);
+        let step = Duration::from_micros(time_us.saturating_sub(newest_us));
+        self.newest_us = Some(newest_us.max(time_us));
+        if step <= self.longest {
+            self.recorded += step;
         }
-        self.latest
+        if self.speed > 0.0 {
+            let played = Duration::try_from_secs_f64(self.recorded.as_secs_f64() / self.speed);
+            played.unwrap_or(Duration::MAX)
+        } else {
+            Duration::ZERO
+        }
     }
 }
 
@@ -92,12 +101,12 @@ pub struct Player {
 }
 
 impl Player {
-    /// Plays onto `link`; see [`Pace::new`] for the speed.
+    /// Plays onto `link` at this pace.
     #[must_use]
-    pub fn new(link: Link, speed: f64) -> Self {
+    pub fn new(link: Link, pace: Pace) -> Self {
         Self {
             link,
-            pace: Pace::new(speed),
+            pace,
             start: None,
             played: Played::default(),
         }
@@ -112,6 +121,15 @@ impl Player {
             self.idle(LINGER)?;
         }
         Ok(())
+    }
+
+    /// How long the record of this time has to wait from now on.
+    #[must_use]
+    pub fn wait(&self, time_us: u64) -> Duration {
+        let now = self.start.map_or(Duration::ZERO, |start| start.elapsed());
+        // A copy: only playing the record moves the pace on.
+        let mut pace = self.pace;
+        pace.due(time_us).saturating_sub(now)
     }
 
     /// Sends the frame of the next record when it is due.

@@ -18,6 +18,12 @@ use trace::{Entry, Record};
 /// Mode changes and faults that are drawn; more than fit on a page are counted only.
 const MAX_EVENTS: usize = 200;
 
+/// The pictures one below the other, as a self-contained SVG document.
+#[must_use]
+pub fn page(plots: &[Plot]) -> String {
+    svg::page(plots)
+}
+
 /// Gathers what is drawn, record by record.
 pub struct Plot {
     drive: Drive,
@@ -94,10 +100,13 @@ impl Plot {
         }
     }
 
-    /// The picture, as a self-contained SVG document.
+    /// Whether no record held anything to draw.
     #[must_use]
-    pub fn svg(&self) -> String {
-        svg::draw(self)
+    pub fn is_empty(&self) -> bool {
+        let curves = [&self.set, &self.actual, &self.error, &self.torque];
+        self.modes.is_empty()
+            && self.marks.is_empty()
+            && curves.into_iter().flatten().all(Series::is_empty)
     }
 
     fn feedback(&mut self, feedback: &Feedback) {

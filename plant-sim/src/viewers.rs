@@ -57,6 +57,10 @@ impl Observer for Viewers {
 impl Pace for Viewers {
     fn sample(&mut self, now: Instant) -> io::Result<()> {
         let now = Duration::from_nanos(now.nanos());
+        // Answers clients, accepts new ones and lets others go.
+        if let Link::SlcanHub(hub) = &mut *self.hub.borrow_mut() {
+            hub.exchange();
+        }
         match self.origin {
             Some(origin) => sleep_until(origin + now),
             None => {

@@ -115,6 +115,7 @@ fn an_external_controller_moves_the_arm_by_the_same_bits() {
                 .record(&Record {
                     time_us: time.micros(),
                     interface: Interface::CAN0,
+                    direction: None,
                     entry: Entry::Frame(*frame),
                 })
                 .unwrap();

@@ -15,6 +15,7 @@ fn take(monitor: &mut Monitor, time_us: u64, frame: CanFrame) {
     monitor.record(&Record {
         time_us,
         interface: Interface::CAN0,
+        direction: None,
         entry: Entry::Frame(frame),
     });
 }

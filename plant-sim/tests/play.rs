@@ -22,6 +22,7 @@ fn record(time_us: u64, frame: CanFrame) -> Record {
     Record {
         time_us,
         interface: Interface::CAN0,
+        direction: None,
         entry: Entry::Frame(frame),
     }
 }
@@ -42,12 +43,10 @@ fn every_frame_is_played_in_order_and_none_before_its_time() {
     let error = Record {
         time_us: 5_000,
         interface: Interface::CAN0,
-        entry: Entry::Error(ErrorFrame {
-            class: 0x40,
-            data: [0; 8],
-        }),
+        direction: None,
+        entry: Entry::Error(ErrorFrame::new(0x40, &[0; 8]).unwrap()),
     };
-    let mut player = Player::new(link, 2.0);
+    let mut player = Player::new(link, Pace::new(2.0, None));
     let begun = Instant::now();
     player.record(&record(1_000, classical)).unwrap();
     player.record(&error).unwrap();
@@ -73,7 +72,7 @@ fn a_slow_reader_delays_and_loses_nothing() {
     // More than the buffers of any socket hold: megabytes.
     const FRAMES: u64 = 100_000;
     let (link, mut peer) = adapter();
-    let mut player = Player::new(link, 0.0);
+    let mut player = Player::new(link, Pace::new(0.0, None));
     let heard = thread::spawn(move || {
         // Full buffers are what is to be seen: the reader starts when they are.
         thread::sleep(Duration::from_millis(300));
@@ -92,7 +91,7 @@ fn a_slow_reader_delays_and_loses_nothing() {
 #[test]
 fn a_bus_that_takes_nothing_is_given_up() {
     let (link, _peer) = adapter();
-    let mut player = Player::new(link, 0.0);
+    let mut player = Player::new(link, Pace::new(0.0, None));
     let ended = (0..1_000_000).find_map(|_| player.record(&record(0, long_frame())).err());
     assert!(matches!(ended, Some(PlayError::Stuck)), "{ended:?}");
 }
@@ -101,7 +100,7 @@ fn a_bus_that_takes_nothing_is_given_up() {
 fn a_peer_that_has_gone_is_named() {
     let (link, peer) = adapter();
     drop(peer);
-    let mut player = Player::new(link, 0.0);
+    let mut player = Player::new(link, Pace::new(0.0, None));
     let ended = (0..1_000_000).find_map(|_| player.record(&record(0, long_frame())).err());
     assert!(
         matches!(ended, Some(PlayError::Link(LinkError::Closed { .. }))),
@@ -115,7 +114,7 @@ proptest! {
         times in prop::collection::vec(any::<u32>(), 1..50),
         speed in 0.001..1000.0_f64,
     ) {
-        let mut pace = Pace::new(speed);
+        let mut pace = Pace::new(speed, None);
         let mut latest = 0.0_f64;
         for &time in &times {
             let recorded = f64::from(time.saturating_sub(times[0])) * 1e-6;
@@ -128,7 +127,7 @@ proptest! {
 
     #[test]
     fn without_pauses_all_are_due_at_once(times in prop::collection::vec(any::<u64>(), 1..50)) {
-        let mut pace = Pace::new(0.0);
+        let mut pace = Pace::new(0.0, None);
         for time in times {
             prop_assert_eq!(pace.due(time), Duration::ZERO);
         }

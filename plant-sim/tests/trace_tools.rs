@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use firmware::mechanics::arm::IRB_930;
 use plant_sim::check::{Checker, Offence};
-use plant_sim::plot::Plot;
+use plant_sim::plot::{Plot, page};
 use plant_sim::replay::Replay;
 use plant_sim::run::execute;
 use protocol::codec::{self, DecodeError};
@@ -21,13 +21,14 @@ use sim::setup::RunConfig;
 use sim::summary::Summary;
 use trace::decode::{Decoder, Format};
 use trace::difference::Difference;
-use trace::stats::{Gatherer, Statistics};
+use trace::stats::{BusStatistics, Gatherer, Statistics};
 use trace::{Entry, ErrorFrame, Interface, Reader, Record};
 
 fn record(time_us: u64, frame: CanFrame) -> Record {
     Record {
         time_us,
         interface: Interface::CAN0,
+        direction: None,
         entry: Entry::Frame(frame),
     }
 }
@@ -224,10 +225,7 @@ fn what_is_not_ours_is_not_judged() {
     let mut records = good();
     let foreign = CanFrame::classical(StandardId::new(0x123).unwrap(), &[1]).unwrap();
     records.insert(3, record(1100, foreign));
-    let error = ErrorFrame {
-        class: 0x80,
-        data: [0; 8],
-    };
+    let error = ErrorFrame::new(0x80, &[0; 8]).unwrap();
     records.insert(
         4,
         Record {
@@ -303,10 +301,8 @@ fn what_is_no_message_is_shown_raw() {
     let error = Record {
         time_us: 3,
         interface: Interface::new("a\"b,c").unwrap(),
-        entry: Entry::Error(ErrorFrame {
-            class: 0x40,
-            data: [1, 0, 0, 0, 0, 0, 0, 2],
-        }),
+        direction: None,
+        entry: Entry::Error(ErrorFrame::new(0x40, &[1, 0, 0, 0, 0, 0, 0, 2]).unwrap()),
     };
     let text = decoded(
         &[record(1, wrong), record(2, foreign), error],
@@ -325,6 +321,7 @@ fn what_is_no_message_is_shown_raw() {
         (get(2, "id"), get(2, "raw")),
         ("20000040", "0100000000000002")
     );
+    assert_eq!(get(2, "error"), "bus-off");
     assert_eq!(get(2, "interface"), "a\"b,c");
 }
 
@@ -336,6 +333,11 @@ fn statistics(records: &[Record]) -> Statistics {
     gatherer.statistics()
 }
 
+/// Statistics of the one interface.
+fn bus(records: &[Record]) -> BusStatistics {
+    statistics(records).interfaces.remove(0)
+}
+
 /// Periods of 900 and 1100 us in turn: mean 1000, standard deviation 100 us exactly; then a gap of three samples.
 #[test]
 fn statistics_are_those_of_the_definition() {
@@ -345,7 +347,7 @@ fn statistics_are_those_of_the_definition() {
         .zip(0..)
         .map(|(&time, n)| record(time, feedback(n)))
         .collect();
-    let line = statistics(&records).ids.remove(0);
+    let line = bus(&records).ids.remove(0);
     let period = line.period.unwrap();
     assert_eq!(line.frames, 101);
     // 100 additions of a running mean and of squares: a few hundred rounding errors of 2^-53 at most.
@@ -362,7 +364,7 @@ fn statistics_are_those_of_the_definition() {
     let id = StandardId::new(table::FEEDBACK.id).unwrap();
     records.push(record(104_300, CanFrame::fd(id, &damaged, true).unwrap()));
     records.push(record(104_400, CanFrame::fd(id, &[], true).unwrap()));
-    let line = statistics(&records).ids.remove(0);
+    let line = bus(&records).ids.remove(0);
     assert_eq!(
         (
             line.gaps,
@@ -388,7 +390,7 @@ fn load_is_the_time_of_the_frames() {
                 .nanos()
         })
         .sum();
-    let statistics = statistics(&records);
+    let statistics = bus(&records);
     assert_eq!(statistics.load, busy as f64 / 9_200_000.0);
     let by_id: f64 = statistics.ids.iter().map(|line| line.load).sum();
     assert!((by_id - statistics.load).abs() < 1e-12);
@@ -439,7 +441,7 @@ fn a_run_keeps_the_rules_and_replays() {
     assert_eq!(statistics.frames, summary.frames);
     // The rig divides the same busy time by the whole run, the trace by the time between its first and last frame.
     let (ours, theirs) = (
-        statistics.load * statistics.span_s,
+        statistics.interfaces[0].load * statistics.span_s,
         summary.bus_load * summary.sim_time_s,
     );
     assert!((ours - theirs).abs() <= 1e-9 * theirs, "{ours} {theirs}");
@@ -498,7 +500,7 @@ fn the_picture_shows_what_happened() {
     }
     let stop = CanFrame::classical(StandardId::new(1).unwrap(), &[]).unwrap();
     plot.record(&record(RUN.0.last().unwrap().time_us, stop));
-    let svg = plot.svg();
+    let svg = page(&[plot]);
     for expected in [
         "a &lt;run&gt; &amp; more",
         "ready from",

@@ -79,7 +79,7 @@ impl Counters {
     }
 }
 
-/// The causes that occurred: `3 with a wrong CRC, 1 stale`, or `none`.
+/// The causes that occurred: `3 with a wrong CRC, 1 stale`, or `none`; a count that ran out is `>= 65535`.
 impl fmt::Display for Counters {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let causes = [
@@ -97,7 +97,8 @@ impl fmt::Display for Counters {
         ];
         let mut separator = "";
         for (count, cause) in causes.into_iter().filter(|(count, _)| *count > 0) {
-            write!(f, "{separator}{count} {cause}")?;
+            let at_least = if count == u16::MAX { ">= " } else { "" };
+            write!(f, "{separator}{at_least}{count} {cause}")?;
             separator = ", ";
         }
         if separator.is_empty() {

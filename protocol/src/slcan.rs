@@ -3,16 +3,22 @@
 //! One line is one command or one frame, ended by a carriage return; BEL refuses. Frames are `t` and `T` (data), `r`
 //! and `R` (remote), `d` and `D` (FD), `b` and `B` (FD with bit rate switch), small letters for 11-bit identifiers,
 //! followed by identifier (3 or 8 hex digits), data length code (1) and data. There is no place for the error state
-//! indicator: it is lost. Hex digits are written in capitals and read in either case, as the Linux driver does.
+//! indicator: it is lost. Hex digits are written in capitals and read in either case, as the Linux driver does. Line feeds
+//! mean nothing, wherever they stand. A frame may end in a timestamp of 4 digits (ms, CAN232) or 8 (us), which is read over.
+
+mod text;
 
 use core::fmt;
 
-use crate::frame::{
-    CLASSICAL_MAX, CanFrame, ExtendedId, FD_MAX, FrameKind, Id, StandardId, fd_length_of_dlc,
-};
+use crate::frame::{CLASSICAL_MAX, CanFrame, ExtendedId, FD_MAX, Id, StandardId, fd_length_of_dlc};
+
+pub use text::Text;
 
 /// Longest line: letter, 29-bit identifier, length code, 64 bytes, carriage return.
 pub const MAX_LINE: usize = 1 + 8 + 1 + 2 * FD_MAX + 1;
+
+/// Longest timestamp behind a frame, digits.
+const MAX_STAMP: usize = 8;
 
 /// Ends every line; alone it acknowledges.
 pub const CR: u8 = b'\r';
@@ -45,8 +51,22 @@ pub enum Line {
     VersionIs([u8; 2]),
     /// `N`: ask for the serial number.
     SerialNumber,
+    /// `Nxxxx`: serial number, four letters or digits.
+    SerialNumberIs([u8; 4]),
     /// `F`: ask for the status flags.
     Status,
+    /// `Fhh`: status flags; 0 is no error.
+    StatusIs(u8),
+    /// `Z0` or `Z1`: received frames end in a timestamp.
+    Timestamps(bool),
+    /// `Mhhhhhhhh`: acceptance code, the identifiers that pass where the mask has zeros.
+    AcceptanceCode(u32),
+    /// `mhhhhhhhh`: acceptance mask; all ones let everything pass.
+    AcceptanceMask(u32),
+    /// `s` with register values or rates, in the dialect of the adapter: bit timing.
+    Timing,
+    /// `X0` or `X1`: received frames are sent as they come, without being asked for.
+    AutoPoll(bool),
 }
 
 /// Why a line says nothing. It is dropped up to its carriage return; the next line is read afresh.
@@ -66,7 +86,7 @@ pub enum SlcanError {
     IdOutOfRange(u32),
     /// The number is more than the command allows.
     OutOfRange(u8),
-    /// No line has more than [`MAX_LINE`] bytes.
+    /// No line has more than [`MAX_LINE`] bytes and a timestamp.
     TooLong,
 }
 
@@ -78,7 +98,7 @@ impl fmt::Display for SlcanError {
             Self::NotHex { at } => write!(f, "no hex digit at place {at}"),
             Self::IdOutOfRange(id) => write!(f, "identifier {id:#x} has too many bits"),
             Self::OutOfRange(digit) => write!(f, "digit {digit} is more than the command allows"),
-            Self::TooLong => write!(f, "line of more than {MAX_LINE} bytes"),
+            Self::TooLong => write!(f, "line of more than {} bytes", MAX_LINE + MAX_STAMP),
         }
     }
 }
@@ -88,7 +108,7 @@ impl core::error::Error for SlcanError {}
 /// Takes bytes one by one, in fixed memory, and gives lines. Any input is allowed.
 #[derive(Clone, Debug)]
 pub struct Parser {
-    line: [u8; MAX_LINE - 1],
+    line: [u8; MAX_LINE - 1 + MAX_STAMP],
     /// Bytes of the line so far, kept or not.
     len: usize,
 }
@@ -104,7 +124,7 @@ impl Parser {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            line: [0; MAX_LINE - 1],
+            line: [0; MAX_LINE - 1 + MAX_STAMP],
             len: 0,
         }
     }
@@ -120,6 +140,7 @@ impl Parser {
                 self.len = 0;
                 Some(parsed)
             }
+            b'\n' => None,
             // A refusal stands alone; whatever came before it was no line.
             BEL => {
                 self.len = 0;
@@ -148,20 +169,25 @@ fn parse(line: &[u8]) -> Result<Line, SlcanError> {
         b'O' => bare(rest, Line::Open),
         b'L' => bare(rest, Line::Listen),
         b'C' => bare(rest, Line::Close),
-        b'N' => bare(rest, Line::SerialNumber),
-        b'F' => bare(rest, Line::Status),
+        // What adapters say of a frame that they sent.
+        b'z' | b'Z' if rest.is_empty() => Ok(Line::Empty),
+        b'Z' => digit(rest, 1).map(|on| Line::Timestamps(on == 1)),
+        b'X' => digit(rest, 1).map(|on| Line::AutoPoll(on == 1)),
+        b'M' => exactly::<8>(rest).map(Line::AcceptanceCode),
+        b'm' => exactly::<8>(rest).map(Line::AcceptanceMask),
+        b's' if !rest.is_empty() => Ok(Line::Timing),
+        b'N' if rest.is_empty() => Ok(Line::SerialNumber),
+        b'N' => match rest.first_chunk::<4>() {
+            Some(letters) if rest.len() == 4 => Ok(Line::SerialNumberIs(*letters)),
+            _ => Err(SlcanError::WrongLength),
+        },
+        b'F' if rest.is_empty() => Ok(Line::Status),
+        b'F' => exactly::<2>(rest).map(|flags| Line::StatusIs(flags as u8)),
         b'S' => digit(rest, 8).map(Line::Bitrate),
         b'Y' => digit(rest, 9).map(Line::DataBitrate),
         b'V' if rest.is_empty() => Ok(Line::Version),
         b'V' => {
-            let (digits, &[]) = rest
-                .split_first_chunk::<4>()
-                .ok_or(SlcanError::WrongLength)?
-            else {
-                return Err(SlcanError::WrongLength);
-            };
-            let version = number(digits, 1)?;
-            Ok(Line::VersionIs([(version >> 8) as u8, version as u8]))
+            exactly::<4>(rest).map(|version| Line::VersionIs([(version >> 8) as u8, version as u8]))
         }
         _ => Err(SlcanError::UnknownCommand(command)),
     }
@@ -184,6 +210,15 @@ fn digit(rest: &[u8], max: u8) -> Result<u8, SlcanError> {
         Ok(value)
     } else {
         Err(SlcanError::OutOfRange(value))
+    }
+}
+
+/// Number of exactly `N` hex digits, at most 8, behind the letter of the command.
+fn exactly<const N: usize>(rest: &[u8]) -> Result<u32, SlcanError> {
+    if rest.len() == N {
+        number(rest, 1)
+    } else {
+        Err(SlcanError::WrongLength)
     }
 }
 
@@ -216,9 +251,13 @@ fn frame(command: u8, rest: &[u8]) -> Result<CanFrame, SlcanError> {
     } else {
         fd_length_of_dlc(dlc).unwrap_or(0)
     };
-    if data.len() != 2 * len {
+    let (data, stamp) = data
+        .split_at_checked(2 * len)
+        .ok_or(SlcanError::WrongLength)?;
+    if !matches!(stamp.len(), 0 | 4 | MAX_STAMP) {
         return Err(SlcanError::WrongLength);
     }
+    number(stamp, dlc_at + 1 + 2 * len)?;
     let mut bytes = [0; FD_MAX];
     for (k, (byte, &[high, low])) in bytes.iter_mut().zip(data.as_chunks().0).enumerate() {
         let at = dlc_at + 1 + 2 * k;
@@ -251,99 +290,5 @@ fn nibble(digit: u8, at: usize) -> Result<u8, SlcanError> {
         b'a'..=b'f' => Ok(digit - b'a' + 10),
         b'A'..=b'F' => Ok(digit - b'A' + 10),
         _ => Err(SlcanError::NotHex { at }),
-    }
-}
-
-/// One line ready to send, its end included.
-#[derive(Clone, Copy, Debug)]
-pub struct Text {
-    buffer: [u8; MAX_LINE],
-    len: usize,
-}
-
-impl Text {
-    const fn new() -> Self {
-        Self {
-            buffer: [0; MAX_LINE],
-            len: 0,
-        }
-    }
-
-    fn byte(&mut self, byte: u8) {
-        if let Some(place) = self.buffer.get_mut(self.len) {
-            *place = byte;
-            self.len += 1;
-        }
-    }
-
-    fn hex(&mut self, number: u32, digits: u32) {
-        for k in (0..digits).rev() {
-            let nibble = (number >> (4 * k)) as u8 & 0x0F;
-            self.byte(if nibble < 10 {
-                b'0' + nibble
-            } else {
-                b'A' + nibble - 10
-            });
-        }
-    }
-
-    fn letter_and_digit(&mut self, letter: u8, digit: u8) {
-        self.byte(letter);
-        self.hex(u32::from(digit), 1);
-    }
-
-    fn frame(&mut self, frame: &CanFrame) {
-        let letter = match frame.kind() {
-            FrameKind::Classical { remote: false } => b't',
-            FrameKind::Classical { remote: true } => b'r',
-            FrameKind::Fd { brs: false, .. } => b'd',
-            FrameKind::Fd { brs: true, .. } => b'b',
-        };
-        if frame.is_extended() {
-            self.byte(letter.to_ascii_uppercase());
-            self.hex(frame.raw_id(), 8);
-        } else {
-            self.byte(letter);
-            self.hex(frame.raw_id(), 3);
-        }
-        self.hex(u32::from(frame.dlc()), 1);
-        for &byte in frame.data() {
-            self.hex(u32::from(byte), 2);
-        }
-    }
-
-    /// The bytes to send.
-    #[must_use]
-    pub fn as_bytes(&self) -> &[u8] {
-        self.buffer.get(..self.len).unwrap_or_default()
-    }
-}
-
-impl From<Line> for Text {
-    fn from(line: Line) -> Self {
-        let mut text = Self::new();
-        match line {
-            Line::Refused => {
-                text.byte(BEL);
-                return text;
-            }
-            Line::Empty => {}
-            Line::Frame(frame) => text.frame(&frame),
-            Line::Open => text.byte(b'O'),
-            Line::Listen => text.byte(b'L'),
-            Line::Close => text.byte(b'C'),
-            Line::Bitrate(rate) => text.letter_and_digit(b'S', rate),
-            Line::DataBitrate(rate) => text.letter_and_digit(b'Y', rate),
-            Line::Version => text.byte(b'V'),
-            Line::VersionIs([hardware, software]) => {
-                text.byte(b'V');
-                text.hex(u32::from(hardware), 2);
-                text.hex(u32::from(software), 2);
-            }
-            Line::SerialNumber => text.byte(b'N'),
-            Line::Status => text.byte(b'F'),
-        }
-        text.byte(CR);
-        text
     }
 }

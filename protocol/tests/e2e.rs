@@ -6,6 +6,7 @@ mod common;
 use common::{Bytes, bitwise_crc, crc8, crc16};
 use crc::{CRC_8_AUTOSAR, CRC_16_IBM_3740, Crc};
 use proptest::prelude::*;
+use protocol::counters::Counters;
 use protocol::e2e::{Profile, Receiver, Verdict};
 
 #[test]
@@ -167,4 +168,18 @@ fn a_stuck_counter_never_becomes_new() {
     assert!(receiver.judge(9).is_new());
     assert!((0..1000).all(|_| receiver.judge(9) == Verdict::Duplicate));
     assert_eq!(receiver.judge(10), Verdict::Fresh);
+}
+
+/// A count that stays at its greatest value says that there may have been more.
+#[test]
+fn a_count_that_ran_out_is_no_exact_one() {
+    let mut counters = Counters::default();
+    for _ in 0..u16::MAX - 1 {
+        counters.judge(Verdict::Duplicate);
+    }
+    assert_eq!(counters.to_string(), "65534 duplicate");
+    for _ in 0..2 {
+        counters.judge(Verdict::Duplicate);
+    }
+    assert_eq!(counters.to_string(), ">= 65535 duplicate");
 }

@@ -42,6 +42,12 @@ fn line() -> impl Strategy<Value = Line> {
         1 => (0..=8u8).prop_map(Line::Bitrate),
         1 => (0..=9u8).prop_map(Line::DataBitrate),
         1 => any::<[u8; 2]>().prop_map(Line::VersionIs),
+        1 => any::<u32>().prop_map(Line::AcceptanceCode),
+        1 => any::<u32>().prop_map(Line::AcceptanceMask),
+        1 => any::<bool>().prop_map(Line::Timestamps),
+        1 => any::<bool>().prop_map(Line::AutoPoll),
+        1 => any::<u8>().prop_map(Line::StatusIs),
+        1 => "[0-9A-Za-z]{4}".prop_map(|text| Line::SerialNumberIs(text.into_bytes().try_into().unwrap())),
         1 => prop::sample::select(vec![
             Line::Empty, Line::Refused, Line::Open, Line::Listen, Line::Close, Line::Version, Line::SerialNumber, Line::Status,
         ]),
@@ -108,9 +114,14 @@ fn python_can_opens() {
 #[test]
 fn errors_say_what_is_wrong_and_the_next_line_is_read() {
     use SlcanError::{IdOutOfRange, NotHex, OutOfRange, TooLong, UnknownCommand, WrongLength};
-    let cases: [(&[u8], SlcanError); 20] = [
+    let cases: [(&[u8], SlcanError); 25] = [
         (b"x", UnknownCommand(b'x')),
-        (b"\n", UnknownCommand(b'\n')),
+        (b"Z2", OutOfRange(2)),
+        (b"m1234567", WrongLength),
+        (b"F0", WrongLength),
+        (b"N12345", WrongLength),
+        (b"s", UnknownCommand(b's')),
+        (b"t1232ABCD123", WrongLength),
         (b"\0", UnknownCommand(0)),
         (b"o", UnknownCommand(b'o')),
         (b"t", WrongLength),
@@ -118,7 +129,7 @@ fn errors_say_what_is_wrong_and_the_next_line_is_read() {
         (b"t123", WrongLength),
         (b"t1232AB", WrongLength),
         (b"t1232ABCDE", WrongLength),
-        (b"r1232ABCD", WrongLength),
+        (b"r1232AB", WrongLength),
         (b"t8000", IdOutOfRange(0x800)),
         (b"T200000000", IdOutOfRange(0x2000_0000)),
         (b"t1239", OutOfRange(9)),
@@ -128,7 +139,7 @@ fn errors_say_what_is_wrong_and_the_next_line_is_read() {
         (b"t1231-0", NotHex { at: 5 }),
         (b"O1", WrongLength),
         (b"V101", WrongLength),
-        (&[b'D'; MAX_LINE], TooLong),
+        (&[b'D'; MAX_LINE + 8], TooLong),
     ];
     for (text, error) in cases {
         let bytes = [text, b"\rO\r"].concat();
@@ -139,6 +150,21 @@ fn errors_say_what_is_wrong_and_the_next_line_is_read() {
             text.escape_ascii()
         );
     }
+}
+
+/// Adapters that stamp their frames (4 digits of ms, 8 of us), and hosts that end their lines in CR LF.
+#[test]
+fn timestamps_and_line_feeds_are_read_over() {
+    let data = CanFrame::classical(standard(0x123), &[0xAB, 0xCD]).unwrap();
+    let remote = CanFrame::remote(extended(0x123), 8).unwrap();
+    let fd = CanFrame::fd(standard(0x1C0), &[1; 12], true).unwrap();
+    let bytes = b"C\r\nt1232ABCD0FA1\r\nt1232abcd000f4240\r\nR000001238EA5F\r\n\nb1C090101010101010101010101011234\r";
+    let frames = [data, data, remote, fd].map(|frame| Ok(Line::Frame(frame)));
+    assert_eq!(read(bytes), [&[Ok(Line::Close)], &frames[..]].concat());
+    assert_eq!(Text::stamped(&data, 4001).as_bytes(), b"t1232ABCD0FA1\r");
+    assert_eq!(read(b"t1230000G\r"), [Err(SlcanError::NotHex { at: 8 })]);
+    // Of a frame that was sent, some adapters say z or Z instead of nothing.
+    assert_eq!(read(b"z\rZ\r"), [Ok(Line::Empty), Ok(Line::Empty)]);
 }
 
 /// A reader that starts in the middle, or a sender that never ends its line, costs one line.
@@ -166,6 +192,12 @@ proptest! {
         prop_assert_eq!(read(&bytes), expected);
     }
 
+    /// Whatever stands behind it as a time, the frame is the same.
+    #[test]
+    fn stamped_frames_are_read(frame in frame(), milliseconds in any::<u16>()) {
+        prop_assert_eq!(read(Text::stamped(&frame, milliseconds).as_bytes()), [Ok(Line::Frame(frame))]);
+    }
+
     /// Digits of either case; the letters of the command have a meaning by their case.
     #[test]
     fn small_hex_digits_are_read(frame in frame()) {
@@ -189,7 +221,10 @@ proptest! {
     #[test]
     fn near_misses_are_read_as_what_they_are(text in "[tTrRdDbB][0-9A-F]{4,12}") {
         if let [Ok(line)] = read(format!("{text}\r").as_bytes())[..] {
-            prop_assert_eq!(Text::from(line).as_bytes().to_vec(), format!("{text}\r").into_bytes());
+            let written = Text::from(line).as_bytes().to_vec();
+            let frame = written.strip_suffix(b"\r").unwrap();
+            let stamp = text.as_bytes().strip_prefix(frame).unwrap();
+            prop_assert!(matches!(stamp.len(), 0 | 4 | 8));
         }
     }
 }

@@ -82,6 +82,7 @@ fn record(stamped: &Stamped) -> Record {
     Record {
         time_us: microseconds(stamped.at),
         interface: Interface::CAN0,
+        direction: None,
         entry: Entry::Frame(stamped.frame),
     }
 }

@@ -2,41 +2,34 @@
 //!
 //! Every subcommand reads its trace once, from front to end, in bounded memory.
 
+mod args;
+mod judge;
+mod sink;
 mod source;
 
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
 use std::process::ExitCode;
-use std::time::Instant;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::Subcommand;
 use firmware::mechanics::arm::ArmModel;
-use link::{Link, LinkAddress, SlcanPeer};
-use plant_sim::check::Checker;
-use plant_sim::output;
-use plant_sim::play::{PlayError, Player};
-use plant_sim::plot::Plot;
-use plant_sim::replay::Replay;
-use protocol::time::Period;
-use protocol::wire::BitTiming;
-use sim::model::RobotModel;
-use sim::rig::RigConfig;
-use sim::scenario;
-use trace::Record;
-use trace::convert::{Converter, Target};
+use plant_sim::plot::{Plot, page};
+use trace::convert::Converter;
 use trace::decode::{Decoder, Format};
 use trace::stats::Gatherer;
+use trace::{Interface, Record};
 
 use super::run::load;
 use super::show;
-use source::Source;
+use args::{CheckArgs, ConvertArgs, DecodeArgs, FormatChoice, PlotArgs, ReplayArgs, StatsArgs};
+use sink::{Records, each, refuse_same, written};
+use source::{Source, finish_on_signal};
 
 /// Subcommands of `trace`.
 #[derive(Subcommand)]
 pub enum TraceCommand {
     /// Name every field of every frame, with its unit.
     Decode(DecodeArgs),
-    /// Rates, periods, jitter, losses and bus load, by identifier.
+    /// Rates, periods, jitter, losses, errors and bus load, by interface and identifier.
     Stats(StatsArgs),
     /// Draw positions, errors, torques, modes and faults over time (SVG).
     Plot(PlotArgs),
@@ -48,129 +41,14 @@ pub enum TraceCommand {
     Convert(ConvertArgs),
 }
 
-/// Arguments of `decode`.
-#[derive(Args)]
-pub struct DecodeArgs {
-    /// candump log, or - for standard input.
-    file: PathBuf,
-    /// How it is written.
-    #[arg(long, value_name = "FORMAT", default_value = "text")]
-    format: FormatChoice,
-    /// Write to this file instead of standard output.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum FormatChoice {
-    /// A line for each frame.
-    Text,
-    /// A row for each field.
-    Csv,
-    /// An object for each frame.
-    Jsonl,
-}
-
-/// Arguments of `stats`.
-#[derive(Args)]
-pub struct StatsArgs {
-    /// candump log, or - for standard input.
-    file: PathBuf,
-    /// Print JSON instead of a table.
-    #[arg(long)]
-    json: bool,
-}
-
-/// Arguments of `plot`.
-#[derive(Args)]
-pub struct PlotArgs {
-    /// candump log, or - for standard input.
-    file: PathBuf,
-    /// The robot (a model file); turns encoder counts into joint positions.
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
-    /// Write to this file instead of standard output.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-}
-
-/// Arguments of `check`.
-#[derive(Args)]
-pub struct CheckArgs {
-    /// candump log, or - for standard input.
-    file: PathBuf,
-    /// The robot (a model file); its motors limit the torque.
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
-}
-
-/// Arguments of `replay`.
-#[derive(Args)]
-pub struct ReplayArgs {
-    /// candump log, or - for standard input. For the controller it must begin before its first sample.
-    file: PathBuf,
-    /// The robot that the recorded controller believed in (a model file).
-    #[arg(long, value_name = "FILE", conflicts_with = "bus")]
-    model: Option<PathBuf>,
-    /// Control rate of the recorded controller.
-    #[arg(
-        long,
-        value_name = "HZ",
-        default_value_t = 1000.0,
-        conflicts_with = "bus"
-    )]
-    rate: f64,
-    /// Play every frame onto this bus instead: socketcan:INTERFACE, slcan:TERMINAL, slcan:tcp:HOST:PORT or
-    /// slcan:listen:HOST:PORT.
-    #[arg(long, value_name = "BUS")]
-    bus: Option<LinkAddress>,
-    /// How many times as fast as recorded; 0: as fast as the bus takes the frames.
-    #[arg(long, value_name = "X", default_value_t = 1.0, requires = "bus", allow_negative_numbers = true, value_parser = speed)]
-    speed: f64,
-}
-
-/// A speed at which every time of a trace stays a time.
-fn speed(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(speed) if speed == 0.0 || (0.001..=1000.0).contains(&speed) => Ok(speed),
-        _ => Err("allowed: 0, or 0.001 to 1000".into()),
-    }
-}
-
-/// Arguments of `convert`.
-#[derive(Args)]
-pub struct ConvertArgs {
-    /// candump log, or - for standard input.
-    file: PathBuf,
-    /// What it becomes.
-    #[arg(long, value_name = "FORMAT")]
-    to: TargetChoice,
-    /// Write to this file instead of standard output.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum TargetChoice {
-    /// For Wireshark and tshark.
-    Pcapng,
-    /// For CANalyzer and CANoe.
-    Asc,
-    /// For can-utils and python-can.
-    Candump,
-}
-
 /// Does what the subcommand says.
 pub fn run(command: &TraceCommand) -> Result<ExitCode, String> {
     match command {
         TraceCommand::Decode(args) => decode(args),
         TraceCommand::Stats(args) => stats(args),
         TraceCommand::Plot(args) => plot(args),
-        TraceCommand::Check(args) => check(args),
-        TraceCommand::Replay(args) => match &args.bus {
-            None => replay(args),
-            Some(bus) => play(&args.file, bus, args.speed),
-        },
+        TraceCommand::Check(args) => judge::check(args),
+        TraceCommand::Replay(args) => judge::replay(args),
         TraceCommand::Convert(args) => convert(args),
     }
 }
@@ -181,36 +59,58 @@ fn decode(args: &DecodeArgs) -> Result<ExitCode, String> {
         FormatChoice::Csv => Format::Csv,
         FormatChoice::Jsonl => Format::JsonLines,
     };
-    let mut source = Source::open(&args.file)?;
+    refuse_same(&args.input.file, args.out.as_deref())?;
+    finish_on_signal()?;
+    let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     written(args.out.as_deref(), |sink| {
         let mut decoder = Decoder::new(sink, format)?;
-        each(&mut source, |record| decoder.record(record))?;
-        decoder.finish()?;
-        Ok(())
+        each(&mut source, &mut decoder)?;
+        decoder.finish().map(|_| ())
     })?;
     source.verdict()
 }
 
 fn convert(args: &ConvertArgs) -> Result<ExitCode, String> {
-    let target = match args.to {
-        TargetChoice::Pcapng => Target::Pcapng,
-        TargetChoice::Asc => Target::Asc,
-        TargetChoice::Candump => Target::Candump,
-    };
-    let mut source = Source::open(&args.file)?;
+    let (target, end) = args.goals()?;
+    refuse_same(&args.input.file, args.out.as_deref())?;
+    finish_on_signal()?;
+    let mut source = Source::open(&args.input.file, args.input.selection(end))?;
     written(args.out.as_deref(), |sink| {
         let mut converter = Converter::new(sink, target)?;
-        each(&mut source, |record| converter.record(record))?;
-        converter.finish()?;
-        Ok(())
+        each(&mut source, &mut converter)?;
+        converter.finish().map(|_| ())
     })?;
     source.verdict()
 }
 
+impl<W: Write> Records for Decoder<W> {
+    fn record(&mut self, record: &Record) -> io::Result<()> {
+        Decoder::record(self, record)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Decoder::flush(self)
+    }
+}
+
+impl<W: Write> Records for Converter<W> {
+    fn record(&mut self, record: &Record) -> io::Result<()> {
+        Converter::record(self, record)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Converter::flush(self)
+    }
+}
+
 fn stats(args: &StatsArgs) -> Result<ExitCode, String> {
-    let mut source = Source::open(&args.file)?;
-    let mut gatherer = Gatherer::new(BitTiming::default());
-    while let Some(record) = source.record()? {
+    finish_on_signal()?;
+    let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
+    let mut gatherer = Gatherer::new(args.bitrate);
+    if let Some(longest) = args.skip_gaps {
+        gatherer = gatherer.skipping(u64::try_from(longest.as_micros()).unwrap_or(u64::MAX));
+    }
+    while let Some(record) = source.record() {
         gatherer.record(&record);
     }
     let statistics = gatherer.statistics();
@@ -219,142 +119,37 @@ fn stats(args: &StatsArgs) -> Result<ExitCode, String> {
         show(&(json + "\n"))?;
     } else {
         show(&statistics.to_string())?;
+        if args.histogram {
+            show(&statistics.histograms())?;
+        }
     }
     source.verdict()
 }
 
 fn plot(args: &PlotArgs) -> Result<ExitCode, String> {
+    refuse_same(&args.input.file, args.out.as_deref())?;
+    finish_on_signal()?;
     let arm = ArmModel::from(&load(args.model.as_ref())?);
-    let mut source = Source::open(&args.file)?;
-    let mut plot = Plot::new(&arm, &args.file.display().to_string());
-    while let Some(record) = source.record()? {
-        plot.record(&record);
+    let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
+    let title = args.input.file.display().to_string();
+    let mut plots: Vec<(Interface, Plot)> = Vec::new();
+    while let Some(record) = source.record() {
+        let interface = record.interface;
+        let place = plots.iter().position(|(name, _)| *name == interface);
+        let place = place.unwrap_or_else(|| {
+            plots.push((interface, Plot::new(&arm, &format!("{title}: {interface}"))));
+            plots.len() - 1
+        });
+        plots[place].1.record(&record);
     }
+    plots.retain(|(_, plot)| !plot.is_empty());
+    if plots.is_empty() {
+        source.verdict()?;
+        return Ok(source.nothing("the log has no frame of ours that can be drawn"));
+    }
+    let plots: Vec<Plot> = plots.into_iter().map(|(_, plot)| plot).collect();
     written(args.out.as_deref(), |sink| {
-        sink.write_all(plot.svg().as_bytes())?;
-        sink.flush()?;
-        Ok(())
+        sink.write_all(page(&plots).as_bytes())
     })?;
     source.verdict()
-}
-
-fn check(args: &CheckArgs) -> Result<ExitCode, String> {
-    let arm = ArmModel::from(&load(args.model.as_ref())?);
-    let mut source = Source::open(&args.file)?;
-    let mut checker = Checker::new(&arm);
-    while let Some(line) = source.line()? {
-        let record = line.map_err(|problem| format!("{}: {problem}", source.place()))?;
-        checker
-            .record(&record)
-            .map_err(|offence| format!("{}: {offence}", source.place()))?;
-    }
-    let counts = checker.counts();
-    show(&format!(
-        "{} frames keep every rule; {} foreign frames and {} error frames are not judged\n",
-        counts.judged, counts.foreign, counts.error_frames
-    ))?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
-    scenario::check_rate(args.rate)
-        .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
-    let model: RobotModel = load(args.model.as_ref())?;
-    let config = RigConfig {
-        nominal: ArmModel::from(&model),
-        actual: model,
-        period: Period::of_rate(args.rate),
-        start: [0.0; 4],
-        timing: BitTiming::default(),
-    };
-    let mut source = Source::open(&args.file)?;
-    let mut replay = Replay::new(config.controller());
-    while let Some(record) = source.record()? {
-        replay
-            .record(&record)
-            .map_err(|difference| format!("{}: {difference}", source.place()))?;
-    }
-    show(&format!(
-        "{} commands are the same, byte for byte\n",
-        replay.compared()
-    ))?;
-    source.verdict()
-}
-
-fn play(file: &Path, bus: &LinkAddress, speed: f64) -> Result<ExitCode, String> {
-    let mut source = Source::open(file)?;
-    let link = Link::open(bus).map_err(|error| error.to_string())?;
-    let mut player = Player::new(link, speed);
-    let failed = |error: PlayError| format!("{bus}: {error}");
-    if let LinkAddress::Slcan(SlcanPeer::Listen(_)) = bus {
-        eprintln!("plant-sim: waiting for a client on {bus}");
-        player.wait_for_client().map_err(failed)?;
-    }
-    let begun = Instant::now();
-    while let Some(record) = source.record()? {
-        player
-            .record(&record)
-            .map_err(|error| format!("{}: {}", source.place(), failed(error)))?;
-    }
-    let played = player.finish().map_err(failed)?;
-    show(&format!(
-        "{} frames played onto {bus} in {:.3} s; {} had to wait for a place in the queue, {} error frames left out\n",
-        played.frames,
-        begun.elapsed().as_secs_f64(),
-        played.waited,
-        played.left_out,
-    ))?;
-    if played.lost > 0 {
-        return Err(format!(
-            "{bus}: {} frames were refused or not read at the other end",
-            played.lost
-        ));
-    }
-    source.verdict()
-}
-
-/// Which end failed.
-enum Failure {
-    Input(String),
-    Output(io::Error),
-}
-
-impl From<io::Error> for Failure {
-    fn from(error: io::Error) -> Self {
-        Self::Output(error)
-    }
-}
-
-/// Hands every record to `take`.
-fn each(
-    source: &mut Source,
-    mut take: impl FnMut(&Record) -> io::Result<()>,
-) -> Result<(), Failure> {
-    while let Some(record) = source.record().map_err(Failure::Input)? {
-        take(&record)?;
-    }
-    Ok(())
-}
-
-/// Does the writing, to the file or to standard output. A reader of standard output that has seen enough and gone
-/// (`| head`) is no error.
-fn written(
-    out: Option<&Path>,
-    write: impl FnOnce(&mut dyn Write) -> Result<(), Failure>,
-) -> Result<(), String> {
-    let Some(path) = out else {
-        let mut sink = BufWriter::with_capacity(1 << 16, io::stdout().lock());
-        return match write(&mut sink) {
-            Ok(()) => Ok(()),
-            Err(Failure::Input(message)) => Err(message),
-            Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-            Err(Failure::Output(error)) => Err(format!("cannot write to standard output: {error}")),
-        };
-    };
-    let mut file = output::File::create(path).map_err(|error| error.to_string())?;
-    match write(&mut file) {
-        Ok(()) => file.persist().map_err(|error| error.to_string()),
-        Err(Failure::Input(message)) => Err(message),
-        Err(Failure::Output(error)) => Err(format!("cannot write {}: {error}", path.display())),
-    }
 }

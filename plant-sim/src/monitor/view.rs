@@ -41,7 +41,10 @@ impl Monitor {
 
     fn bus_line(&self, total: &Statistics) -> Line<'_> {
         let load = match &self.window {
-            Some(window) => format!("  load {:.1} %", window.load * 100.0),
+            Some(window) => {
+                let load = window.interfaces.first().map_or(0.0, |bus| bus.load);
+                format!("  load {:.1} %", load * 100.0)
+            }
             None => "  load -".to_owned(),
         };
         let mut spans = vec![
@@ -88,17 +91,13 @@ impl Monitor {
     }
 
     fn draw_table(&self, frame: &mut Frame, area: Rect, total: &Statistics) {
-        let rows = total
-            .ids
-            .iter()
-            .zip(self.newest.values())
-            .map(|(line, newest)| {
-                let recent = self
-                    .window
-                    .as_ref()
-                    .and_then(|window| window.ids.iter().find(|recent| recent.id == line.id));
-                row(line, recent, describe(newest))
-            });
+        let rows = ids(total).zip(self.newest.values()).map(|(line, newest)| {
+            let recent = self
+                .window
+                .as_ref()
+                .and_then(|window| ids(window).find(|recent| recent.id == line.id));
+            row(line, recent, describe(newest))
+        });
         let header = Row::new([
             "id",
             "message",
@@ -143,6 +142,11 @@ impl Monitor {
             area,
         );
     }
+}
+
+/// Identifiers of the one bus that is watched.
+fn ids(statistics: &Statistics) -> impl Iterator<Item = &IdStatistics> {
+    statistics.interfaces.iter().flat_map(|bus| &bus.ids)
 }
 
 /// One identifier: how it came in the last second, what has been wrong since the start, and its newest values.

@@ -31,6 +31,11 @@ impl Default for Series {
 }
 
 impl Series {
+    /// Whether it has no value.
+    pub fn is_empty(&self) -> bool {
+        self.bins.is_empty()
+    }
+
     /// Adds a value. Time counts from the start of the trace.
     pub fn push(&mut self, time_us: u64, value: f32) {
         while time_us / self.width_us >= BINS as u64 {

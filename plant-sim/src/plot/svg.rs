@@ -46,17 +46,28 @@ struct Curve<'a> {
     dots: bool,
 }
 
-/// The whole document.
-pub fn draw(plot: &Plot) -> String {
+/// The whole document, with all pictures.
+pub fn page(plots: &[Plot]) -> String {
+    let mut text = String::new();
+    let mut height = 0.0;
+    for plot in plots {
+        line!(text, r#"<g transform="translate(0 {height})">"#);
+        height += draw(&mut text, plot);
+        line!(text, "</g>");
+    }
+    format!(
+        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" font-family="sans-serif" font-size="12" fill="#222">
+<rect width="100%" height="100%" fill="#fff"/>
+{text}</svg>
+"##
+    )
+}
+
+/// One picture; gives its height.
+fn draw(text: &mut String, plot: &Plot) -> f64 {
     let panels = panels(plot);
     let span = (plot.newest_us as f64).max(1.0);
     let height = TOP + panels.len() as f64 * (PANEL + GAP) + 30.0;
-    let mut text = String::new();
-    line!(
-        text,
-        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" font-family="sans-serif" font-size="12" fill="#222">"##
-    );
-    line!(text, r##"<rect width="100%" height="100%" fill="#fff"/>"##);
     line!(
         text,
         r#"<text x="{LEFT}" y="26" font-size="16" font-weight="bold">{}</text>"#,
@@ -69,16 +80,15 @@ pub fn draw(plot: &Plot) -> String {
             plot.undrawn
         );
     }
-    modes(&mut text, plot, span);
+    modes(text, plot, span);
     for (index, panel) in panels.iter().enumerate() {
         let top = TOP + index as f64 * (PANEL + GAP);
-        draw_panel(&mut text, panel, top, span);
+        draw_panel(text, panel, top, span);
     }
     let bottom = TOP + panels.len() as f64 * (PANEL + GAP) - GAP;
-    marks(&mut text, &plot.marks, bottom, span);
-    time_axis(&mut text, bottom, span);
-    line!(text, "</svg>");
-    text
+    marks(text, &plot.marks, bottom, span);
+    time_axis(text, bottom, span);
+    height
 }
 
 fn panels(plot: &Plot) -> Vec<Panel<'_>> {

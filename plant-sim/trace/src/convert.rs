@@ -1,7 +1,7 @@
 //! Traces in the formats of other tools.
 
 mod asc;
-mod pcapng;
+pub(crate) mod pcapng;
 
 use std::io::{self, Write};
 
@@ -49,6 +49,18 @@ impl<W: Write> Converter<W> {
             Kind::Pcapng(pcapng) => pcapng.record(record),
             Kind::Asc(asc) => asc.record(record),
             Kind::Candump(writer) => writer.record(record),
+        }
+    }
+
+    /// Passes on what the file's own buffer holds, so that a reader at the other end of a pipe sees it.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn flush(&mut self) -> io::Result<()> {
+        match &mut self.0 {
+            Kind::Pcapng(pcapng) => pcapng.sink.flush(),
+            Kind::Asc(asc) => asc.sink.flush(),
+            Kind::Candump(writer) => writer.flush(),
         }
     }
 

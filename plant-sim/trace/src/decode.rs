@@ -53,6 +53,14 @@ impl<W: Write> Decoder<W> {
         }
     }
 
+    /// Passes on what the sink holds back, so that a reader at the other end of a pipe sees it.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.sink.flush()
+    }
+
     /// Flushes and gives the sink back.
     ///
     /// # Errors
@@ -119,6 +127,9 @@ impl<W: Write> Decoder<W> {
             content.id(),
             content.name()
         )?;
+        if let Some(direction) = record.direction {
+            write!(sink, r#","direction":"{}""#, direction.name())?;
+        }
         match content {
             Content::Message(_, decoded) => {
                 if let Some(counter) = decoded.counter {
@@ -209,7 +220,7 @@ impl<'a> Content<'a> {
         match self {
             Self::Message(..) => String::new(),
             Self::Refused(_, error) => error.to_string(),
-            Self::ErrorFrame(_) => "reported by the interface".into(),
+            Self::ErrorFrame(error) => error.to_string(),
         }
     }
 
@@ -217,7 +228,7 @@ impl<'a> Content<'a> {
         match self {
             Self::Message(frame, _) | Self::Refused(frame, _) => frame.to_string(),
             Self::ErrorFrame(error) => error
-                .data
+                .data()
                 .iter()
                 .map(|byte| format!("{byte:02X}"))
                 .collect(),

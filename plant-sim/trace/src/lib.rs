@@ -8,7 +8,8 @@
 //! ```
 //!
 //! Three identifier digits are an 11-bit identifier, eight a 29-bit one or, with 0x20000000, an error frame as SocketCAN
-//! reports it. `##` introduces an FD frame, its first digit holds the flags.
+//! reports it. `##` introduces an FD frame, its first digit holds the flags. The [`Reader`] also takes what candump prints
+//! on a screen, Vector ASC and pcapng.
 
 #![forbid(unsafe_code)]
 
@@ -16,9 +17,11 @@ pub mod convert;
 pub mod dbc;
 pub mod decode;
 pub mod difference;
+mod error_frame;
 pub mod fields;
 mod line;
 mod reader;
+pub mod select;
 pub mod stats;
 mod writer;
 
@@ -26,6 +29,7 @@ use std::fmt;
 
 use protocol::frame::CanFrame;
 
+pub use error_frame::ErrorFrame;
 pub use line::Problem;
 pub use reader::{ReadError, Reader};
 pub use writer::Writer;
@@ -46,8 +50,30 @@ pub struct Record {
     pub time_us: u64,
     /// Where.
     pub interface: Interface,
+    /// Which way, if the log says so.
+    pub direction: Option<Direction>,
     /// What.
     pub entry: Entry,
+}
+
+/// Which way a frame went, as the host that logged it saw it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Received from another node.
+    Received,
+    /// Sent by the host itself.
+    Transmitted,
+}
+
+impl Direction {
+    /// `Rx` or `Tx`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Received => "Rx",
+            Self::Transmitted => "Tx",
+        }
+    }
 }
 
 /// What a line reports.
@@ -59,17 +85,8 @@ pub enum Entry {
     Error(ErrorFrame),
 }
 
-/// Error frame of SocketCAN.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ErrorFrame {
-    /// Error classes, a bit set of 29 bits (`linux/can/error.h`).
-    pub class: u32,
-    /// Details, as the classes lay down.
-    pub data: [u8; 8],
-}
-
 /// Name of a CAN interface: 1 to 15 printable ASCII characters without blanks, as Linux has it.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Interface {
     name: [u8; Self::MAX],
     len: u8,
@@ -89,6 +106,12 @@ impl Interface {
     #[must_use]
     pub fn new(name: &str) -> Option<Self> {
         Self::from_bytes(name.as_bytes())
+    }
+
+    /// Name of the interface of this number, counted from 0: `can0`.
+    fn numbered(number: usize) -> Self {
+        // A number too long for a name is of no machine.
+        Self::new(&format!("can{number}")).unwrap_or(Self::CAN0)
     }
 
     fn from_bytes(bytes: &[u8]) -> Option<Self> {

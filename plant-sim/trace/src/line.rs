@@ -2,24 +2,23 @@
 
 use protocol::frame::{CLASSICAL_MAX, CanFrame, ExtendedId, FD_MAX, Id, StandardId, fd_length};
 
-use super::{ERROR_FLAG, Entry, ErrorFrame, FLAG_BRS, FLAG_ESI, FLAG_FDF, Interface, Record};
+use super::{
+    Direction, ERROR_FLAG, Entry, ErrorFrame, FLAG_BRS, FLAG_ESI, FLAG_FDF, Interface, Record,
+};
 
-/// Longest line, line feed not counted, bytes. The longest that can be meant has fewer than 200: timestamp, interface
-/// name, identifier and 64 data bytes.
-pub(super) const MAX_LINE: usize = 256;
+/// Longest line, line feed not counted, bytes. The longest that can be meant, an FD frame in ASC or on a screen, has
+/// fewer than 500.
+pub(super) const MAX_LINE: usize = 1024;
 
 /// What is wrong with a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Problem {
     /// Longer than any line of a log.
-    #[error("longer than {MAX_LINE} bytes; no line of a candump log is")]
+    #[error("longer than {MAX_LINE} bytes; no line of a log is")]
     TooLong,
     /// The file ends within the line.
-    #[error("no line feed at the end; the log was cut off and the frame may be")]
+    #[error("the log was cut off within this frame")]
     Unterminated,
-    /// Line end of another system.
-    #[error("ends in CR LF; lines of a candump log end in LF alone")]
-    CarriageReturn,
     /// The capture itself lost frames here.
     #[error("candump reports that it dropped frames here")]
     Dropped,
@@ -29,8 +28,27 @@ pub enum Problem {
     )]
     Timestamp,
     /// Wrong number of decimals.
-    #[error("timestamp has {0} decimals; exactly 6 are allowed")]
+    #[error("timestamp has {0} decimals; 1 to 9 are allowed")]
     Decimals(usize),
+    /// Screen output whose times cannot be known.
+    #[error(
+        "candump's output for the screen without absolute times; record with candump -L (or candump -t a)"
+    )]
+    Screen,
+    /// CAN XL frame.
+    #[error("CAN XL frames are not supported; classical CAN and CAN FD are")]
+    CanXl,
+    /// Classical frame with a length code above 8.
+    #[error(
+        "length code {0:X} above 8 of a classical frame is not supported; record without candump -8"
+    )]
+    LengthCode(u8),
+    /// Line of an ASC file that begins like a frame and is none.
+    #[error("{0}; not a frame as Vector ASC has them")]
+    Asc(&'static str),
+    /// Packet of a pcapng file that is no CAN frame.
+    #[error("{0}")]
+    Packet(&'static str),
     /// More microseconds than 64 bits hold.
     #[error("timestamp does not fit 64 bits of us; {} seconds are allowed", u64::MAX / 1_000_000 - 1)]
     TimestampRange,
@@ -87,11 +105,8 @@ pub enum Problem {
     Trailing,
 }
 
-/// Parses one line without its line feed.
+/// Parses one line without its end.
 pub(super) fn parse(line: &[u8]) -> Result<Record, Problem> {
-    if line.ends_with(b"\r") {
-        return Err(Problem::CarriageReturn);
-    }
     if line.starts_with(b"DROPCOUNT:") {
         return Err(Problem::Dropped);
     }
@@ -105,31 +120,38 @@ pub(super) fn parse(line: &[u8]) -> Result<Record, Problem> {
     let (name, rest) = split_at_byte(rest, b' ').ok_or(Problem::Interface)?;
     let interface = Interface::from_bytes(name).ok_or(Problem::Interface)?;
 
+    let column = line.len() - rest.len() + 1;
+    let rest = rest.trim_ascii_end();
     let (frame, direction) = split_at_byte(rest, b' ').map_or((rest, None), |(f, d)| (f, Some(d)));
-    if !matches!(direction, None | Some(b"R" | b"T")) {
-        return Err(Problem::Trailing);
-    }
+    let direction = match direction {
+        None => None,
+        Some(b"R") => Some(Direction::Received),
+        Some(b"T") => Some(Direction::Transmitted),
+        Some(_) => return Err(Problem::Trailing),
+    };
     let entry = entry(Text {
         bytes: frame,
-        column: line.len() - rest.len() + 1,
+        column,
     })?;
     Ok(Record {
         time_us,
         interface,
+        direction,
         entry,
     })
 }
 
-/// Microseconds of `seconds.microseconds`.
-fn timestamp(text: &[u8]) -> Result<u64, Problem> {
+/// Microseconds of `seconds.decimals`; what is finer is cut off.
+pub(super) fn timestamp(text: &[u8]) -> Result<u64, Problem> {
     let (seconds, decimals) = split_at_byte(text, b'.').ok_or(Problem::Timestamp)?;
     let digits = |text: &[u8]| !text.is_empty() && text.iter().all(u8::is_ascii_digit);
     if !digits(seconds) || !decimals.iter().all(u8::is_ascii_digit) {
         return Err(Problem::Timestamp);
     }
-    if decimals.len() != 6 {
+    if !(1..=9).contains(&decimals.len()) {
         return Err(Problem::Decimals(decimals.len()));
     }
+    let decimals = decimals.iter().chain(std::iter::repeat(&b'0')).take(6);
     seconds
         .iter()
         .chain(decimals)
@@ -195,7 +217,6 @@ impl<'a> Text<'a> {
 
 const CLASSICAL_LENGTHS: &str = "0 to 8";
 const FD_LENGTHS: &str = "0 to 8, 12, 16, 20, 24, 32, 48 or 64";
-const ERROR_LENGTHS: &str = "exactly 8";
 
 fn entry(text: Text<'_>) -> Result<Entry, Problem> {
     let digits = text
@@ -205,6 +226,10 @@ fn entry(text: Text<'_>) -> Result<Entry, Problem> {
         .ok_or(Problem::Separator)?;
     let (id, rest) = text.split(digits);
     let rest = rest.split(1).1;
+    // Priority and virtual network, then flags, type and acceptance field with colons between.
+    if rest.bytes.get(2) == Some(&b':') {
+        return Err(Problem::CanXl);
+    }
     if digits == 8 {
         let raw = id.number()?;
         if raw & !(ERROR_FLAG - 1) == ERROR_FLAG {
@@ -218,6 +243,11 @@ fn entry(text: Text<'_>) -> Result<Entry, Problem> {
     if let Some(length) = rest.after(b'R').or_else(|| rest.after(b'r')) {
         return remote_frame(id, length).map(Entry::Frame);
     }
+    if let [.., b'_', code] = rest.bytes
+        && let Some(code) = char::from(*code).to_digit(16)
+    {
+        return Err(Problem::LengthCode(code as u8));
+    }
     let mut buffer = [0; CLASSICAL_MAX];
     let data = rest.data(&mut buffer, CLASSICAL_LENGTHS)?;
     CanFrame::classical(id, data)
@@ -229,36 +259,31 @@ fn entry(text: Text<'_>) -> Result<Entry, Problem> {
 }
 
 fn identifier(text: Text<'_>) -> Result<Id, Problem> {
-    let range = |id, max| Problem::IdRange { id, max };
     match text.bytes.len() {
-        3 => {
-            let id = text.number()?;
-            StandardId::new(id as u16)
-                .map(Id::Standard)
-                .ok_or(range(id, StandardId::MAX.as_raw().into()))
-        }
-        8 => {
-            let id = text.number()?;
-            ExtendedId::new(id)
-                .map(Id::Extended)
-                .ok_or(range(id, ExtendedId::MAX.as_raw()))
-        }
+        3 => id(text.number()?, false),
+        8 => id(text.number()?, true),
         digits => Err(Problem::IdDigits(digits)),
     }
 }
 
+/// The identifier of this number, 29 bits or 11.
+pub(super) fn id(raw: u32, extended: bool) -> Result<Id, Problem> {
+    let (id, max) = if extended {
+        let id = ExtendedId::new(raw).map(Id::Extended);
+        (id, ExtendedId::MAX.as_raw())
+    } else {
+        let id = u16::try_from(raw).ok().and_then(StandardId::new);
+        (id.map(Id::Standard), StandardId::MAX.as_raw().into())
+    };
+    id.ok_or(Problem::IdRange { id: raw, max })
+}
+
 fn error_frame(raw: u32, text: Text<'_>) -> Result<ErrorFrame, Problem> {
-    let mut data = [0; 8];
-    let found = text.data(&mut data, ERROR_LENGTHS)?.len();
-    if found != 8 {
-        return Err(Problem::Length {
-            found,
-            allowed: ERROR_LENGTHS,
-        });
-    }
-    Ok(ErrorFrame {
-        class: raw & (ERROR_FLAG - 1),
-        data,
+    let mut buffer = [0; 8];
+    let details = text.data(&mut buffer, CLASSICAL_LENGTHS)?;
+    ErrorFrame::new(raw, details).ok_or(Problem::Length {
+        found: details.len(),
+        allowed: CLASSICAL_LENGTHS,
     })
 }
 
@@ -282,6 +307,11 @@ fn fd_frame(id: Id, text: Text<'_>) -> Result<CanFrame, Problem> {
     }
     let mut buffer = [0; FD_MAX];
     let data = data.data(&mut buffer, FD_LENGTHS)?;
+    fd(id, data, flags & FLAG_BRS != 0, flags & FLAG_ESI != 0)
+}
+
+/// An FD frame of exactly this data.
+pub(super) fn fd(id: Id, data: &[u8], brs: bool, esi: bool) -> Result<CanFrame, Problem> {
     let found = data.len();
     // The frame would pad to the next length: a log holds the frame as it was, so another length is no frame.
     if fd_length(found) != Some(found) {
@@ -290,8 +320,8 @@ fn fd_frame(id: Id, text: Text<'_>) -> Result<CanFrame, Problem> {
             allowed: FD_LENGTHS,
         });
     }
-    CanFrame::fd(id, data, flags & FLAG_BRS != 0)
-        .map(|frame| frame.with_esi(flags & FLAG_ESI != 0))
+    CanFrame::fd(id, data, brs)
+        .map(|frame| frame.with_esi(esi))
         .ok_or(Problem::Length {
             found,
             allowed: FD_LENGTHS,
@@ -299,7 +329,7 @@ fn fd_frame(id: Id, text: Text<'_>) -> Result<CanFrame, Problem> {
 }
 
 /// What stands before and after the first `byte`.
-fn split_at_byte(text: &[u8], byte: u8) -> Option<(&[u8], &[u8])> {
+pub(super) fn split_at_byte(text: &[u8], byte: u8) -> Option<(&[u8], &[u8])> {
     let at = text.iter().position(|&b| b == byte)?;
     Some((&text[..at], &text[at + 1..]))
 }

@@ -1,16 +1,30 @@
-//! Log reader: line by line, in bounded memory.
+//! Log reader: record by record, in bounded memory. The format is found from the first bytes.
 
-use std::io::{self, BufRead, Read};
+mod asc;
+mod pcapng;
+mod screen;
+
+use std::io::{self, BufRead, Chain, Cursor, Read};
+
+use protocol::codec;
+use protocol::table;
 
 use super::{
-    Record,
+    Entry, Record,
     line::{self, MAX_LINE, Problem},
 };
+use asc::Asc;
+use pcapng::Pcapng;
+
+/// Byte order mark of UTF-8, which editors of other systems put in front.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+/// Bytes that tell the formats apart.
+const MAGIC: u64 = 4;
 
 /// A line that could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The line is not one of a candump log. Reading on continues with the next line.
+    /// The line, or packet of a pcapng file, holds no frame. Reading on continues with the next.
     #[error("line {line}: {problem}")]
     Line {
         /// Counted from 1.
@@ -28,26 +42,60 @@ pub enum ReadError {
     },
 }
 
-/// Reads a log; an iterator over its lines.
+/// Reads a log; an iterator over its records. Empty lines and comments (`#`) are passed over.
 pub struct Reader<R> {
-    source: R,
+    source: Chain<Cursor<Vec<u8>>, R>,
+    format: Option<Format>,
     line: u64,
     buffer: Vec<u8>,
+}
+
+enum Format {
+    /// candump, log or screen: every line stands for itself.
+    Candump,
+    Asc(Asc),
+    Pcapng(Pcapng),
 }
 
 impl<R: BufRead> Reader<R> {
     /// Starts at the first line.
     pub fn new(source: R) -> Self {
         Self {
-            source,
+            source: Cursor::new(Vec::new()).chain(source),
+            format: None,
             line: 0,
             buffer: Vec::with_capacity(MAX_LINE + 1),
         }
     }
 
-    /// Number of the line read last, counted from 1; 0 before the first.
+    /// Number of the line or packet read last, counted from 1; 0 before the first.
     pub fn line(&self) -> u64 {
         self.line
+    }
+
+    /// Where the bytes come from.
+    pub fn source(&self) -> &R {
+        self.source.get_ref().1
+    }
+
+    /// Finds the format.
+    fn begin(&mut self) -> io::Result<Format> {
+        let (head, source) = self.source.get_mut();
+        let bytes = head.get_mut();
+        source.by_ref().take(MAGIC).read_to_end(bytes)?;
+        if bytes.starts_with(BYTE_ORDER_MARK) {
+            bytes.drain(..BYTE_ORDER_MARK.len());
+        }
+        Ok(if pcapng::begins(bytes) {
+            Format::Pcapng(Pcapng::default())
+        } else if pcapng::begins_classic(bytes) {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "pcap, not pcapng; convert it with: editcap -F pcapng FILE OUT",
+            ));
+        } else {
+            Format::Candump
+        })
     }
 
     /// Fills the buffer with the next line, or with as much of it as any good line has; its line feed included.
@@ -58,22 +106,67 @@ impl<R: BufRead> Reader<R> {
         Ok(())
     }
 
-    /// Skips the rest of an overlong line.
-    fn skip_line(&mut self) -> io::Result<()> {
-        self.source.skip_until(b'\n').map(|_| ())
+    fn read(&mut self) -> io::Result<Option<Result<Record, Problem>>> {
+        let mut format = match self.format.take() {
+            Some(format) => format,
+            None => self.begin()?,
+        };
+        let read = match &mut format {
+            Format::Pcapng(pcapng) => pcapng.read(&mut self.source, &mut self.line),
+            _ => self.read_text(&mut format),
+        };
+        self.format = Some(format);
+        read
     }
 
-    fn read(&mut self) -> io::Result<Option<Result<Record, Problem>>> {
-        self.fill()?;
-        Ok(match self.buffer.strip_suffix(b"\n") {
-            Some(line) => Some(line::parse(line)),
-            None if self.buffer.is_empty() => None,
-            None if self.buffer.len() > MAX_LINE => {
-                self.skip_line()?;
-                Some(Err(Problem::TooLong))
+    fn read_text(&mut self, format: &mut Format) -> io::Result<Option<Result<Record, Problem>>> {
+        loop {
+            self.line += 1;
+            self.fill()?;
+            if self.buffer.is_empty() {
+                return Ok(None);
             }
-            None => Some(Err(Problem::Unterminated)),
-        })
+            let ended = self.buffer.ends_with(b"\n");
+            let line = self.buffer.trim_ascii_end();
+            if !ended && self.buffer.len() > MAX_LINE {
+                let problem = if screen::is_can_xl(line) {
+                    Problem::CanXl
+                } else {
+                    Problem::TooLong
+                };
+                self.source.skip_until(b'\n')?;
+                return Ok(Some(Err(problem)));
+            }
+            if let Format::Candump = format
+                && Asc::begins(line)
+            {
+                *format = Format::Asc(Asc::default());
+            }
+            let read = match format {
+                Format::Asc(asc) => asc.line(line),
+                _ if line.trim_ascii_start().is_empty()
+                    || line.starts_with(b"#")
+                    || screen::is_detail(line) =>
+                {
+                    None
+                }
+                _ if screen::is_screen(line) => Some(screen::parse(line)),
+                _ => Some(line::parse(line)),
+            };
+            match read {
+                None => {}
+                Some(read) if ended || read.as_ref().is_ok_and(is_whole) => return Ok(Some(read)),
+                Some(_) => return Ok(Some(Err(Problem::Unterminated))),
+            }
+        }
+    }
+}
+
+/// Whether a frame at the end of a log without its line feed is all there: one of ours must be as the table says.
+fn is_whole(record: &Record) -> bool {
+    match &record.entry {
+        Entry::Frame(frame) => table::of_frame(frame).is_none() || codec::decode(frame).is_ok(),
+        Entry::Error(_) => true,
     }
 }
 
@@ -81,9 +174,9 @@ impl<R: BufRead> Iterator for Reader<R> {
     type Item = Result<Record, ReadError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.line += 1;
+        let read = self.read();
         let line = self.line;
-        match self.read() {
+        match read {
             Ok(read) => {
                 read.map(|record| record.map_err(|problem| ReadError::Line { line, problem }))
             }

@@ -6,9 +6,11 @@ use protocol::frame::{CanFrame, FrameKind, Id};
 use sha2::{Digest, Sha256};
 
 use super::{
-    ERROR_FLAG, Entry, ErrorFrame, FLAG_BRS, FLAG_ESI, Interface, LogHash, Record,
-    line::MAX_LINE as CAPACITY,
+    Direction, ERROR_FLAG, Entry, ErrorFrame, FLAG_BRS, FLAG_ESI, Interface, LogHash, Record,
 };
+
+/// More than the longest line has: timestamp, interface name, identifier, 64 data bytes, direction.
+const CAPACITY: usize = 256;
 
 /// Writes a log of one interface, line by line, and hashes it on the way.
 ///
@@ -38,6 +40,7 @@ impl<W: Write> Writer<W> {
         self.record(&Record {
             time_us,
             interface: self.interface,
+            direction: None,
             entry: Entry::Frame(*frame),
         })
     }
@@ -50,6 +53,7 @@ impl<W: Write> Writer<W> {
         self.record(&Record {
             time_us,
             interface: self.interface,
+            direction: None,
             entry: Entry::Error(*error),
         })
     }
@@ -65,13 +69,26 @@ impl<W: Write> Writer<W> {
             Entry::Error(error) => {
                 line.hex(error.class & (ERROR_FLAG - 1) | ERROR_FLAG, 8);
                 line.byte(b'#');
-                line.data(&error.data);
+                line.data(error.data());
             }
+        }
+        match record.direction {
+            None => {}
+            Some(Direction::Received) => line.extend(b" R"),
+            Some(Direction::Transmitted) => line.extend(b" T"),
         }
         line.byte(b'\n');
         self.sink.write_all(line.bytes())?;
         self.hash.update(line.bytes());
         Ok(())
+    }
+
+    /// Flushes the sink.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.sink.flush()
     }
 
     /// Flushes the sink and gives it back with the hash of all that was written.

@@ -1,12 +1,14 @@
 //! A bus of serial lines: a TCP server that each client takes for an adapter ([`slcan`](protocol::slcan)).
 //!
 //! What one client sends, every other one and this node receive. It needs no CAN in the kernel, so it is the way to two
-//! processes, or to a program such as python-can, on any machine. It has no bit timing and no arbitration.
+//! processes, or to a program such as python-can, on any machine. It has no bit timing and no arbitration. A client that
+//! sends faster than the frames are taken, or than it reads its answers, is read no further until they are: memory is
+//! bounded, and TCP holds the client back.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use rustix::event::{PollFd, PollFlags};
 
@@ -19,16 +21,34 @@ use protocol::slcan::{Line, MAX_LINE, Parser, SlcanError, Text};
 const CLIENTS: usize = 16;
 /// Bytes that may wait for a client. One that does not read loses frames, as on a real bus; the others do not notice.
 const QUEUE: usize = 4096 * MAX_LINE;
+/// Frames that may wait for this node; a buffer of each client more, and no client is read.
+const RECEIVED: usize = 4096;
 /// Hardware and software version that clients are told.
 const VERSION: Line = Line::VersionIs([0x10, 0x10]);
+/// Serial number that clients are told.
+const SERIAL_NUMBER: Line = Line::SerialNumberIs(*b"0001");
+/// Milliseconds after which timestamps begin again (CAN232).
+const MINUTE: u128 = 60_000;
+
+/// How a client takes part in the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    /// Not, as before `O` or `L` and after `C`.
+    Closed,
+    /// Listening only.
+    Listening,
+    /// Listening and sending.
+    Open,
+}
 
 #[derive(Debug)]
 struct Client {
     stream: TcpStream,
     parser: Parser,
     output: VecDeque<u8>,
-    /// Takes part in the bus, between `O` and `C`.
-    open: bool,
+    part: Part,
+    /// Frames go to it with the time behind.
+    stamps: bool,
     gone: bool,
 }
 
@@ -83,7 +103,9 @@ impl SlcanHub {
     /// Whether a client takes part in the bus.
     #[must_use]
     pub fn is_open(&self) -> bool {
-        self.clients.iter().any(|client| client.open)
+        self.clients
+            .iter()
+            .any(|client| client.part != Part::Closed)
     }
 
     /// Frames that clients who did not read have lost.
@@ -94,7 +116,11 @@ impl SlcanHub {
 
     /// Moves bytes both ways, and greets who has come, without waiting.
     pub fn exchange(&mut self) {
-        while let Ok((stream, _)) = self.listener.accept() {
+        // No more at once than there may be: a flood of callers must not keep the bus waiting.
+        for _ in 0..CLIENTS {
+            let Ok((stream, _)) = self.listener.accept() else {
+                break;
+            };
             // Small lines must not wait for each other. Who cannot be set up so is turned away.
             if self.clients.len() < CLIENTS
                 && stream.set_nonblocking(true).is_ok()
@@ -104,14 +130,17 @@ impl SlcanHub {
                     stream,
                     parser: Parser::new(),
                     output: VecDeque::new(),
-                    open: false,
+                    part: Part::Closed,
+                    stamps: false,
                     gone: false,
                 });
             }
         }
         let mut frames = Vec::new();
-        for (index, client) in self.clients.iter_mut().enumerate() {
-            client.read(self.may, |frame| frames.push((index, frame)));
+        if self.received.len() < RECEIVED {
+            for (index, client) in self.clients.iter_mut().enumerate() {
+                client.read(self.may, |frame| frames.push((index, frame)));
+            }
         }
         for (from, frame) in frames {
             self.spread(&frame, Some(from));
@@ -135,7 +164,10 @@ impl SlcanHub {
                 .clients
                 .iter()
                 .map(|client| {
-                    let mut events = PollFlags::IN;
+                    let mut events = PollFlags::empty();
+                    if client.has_room() {
+                        events |= PollFlags::IN;
+                    }
                     if !client.output.is_empty() {
                         events |= PollFlags::OUT;
                     }
@@ -150,10 +182,8 @@ impl SlcanHub {
         Ok(!self.received.is_empty())
     }
 
+    /// Of what the last exchange brought: who empties the queue comes to an end, however fast clients send.
     pub(super) fn take(&mut self) -> Option<Stamped> {
-        if self.received.is_empty() {
-            self.exchange();
-        }
         self.received.pop_front()
     }
 
@@ -170,11 +200,16 @@ impl SlcanHub {
     }
 
     fn spread(&mut self, frame: &CanFrame, from: Option<usize>) {
-        let text = Text::from(Line::Frame(*frame));
+        let plain = Text::from(Line::Frame(*frame));
+        let now = SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .unwrap_or_default();
+        let stamped = Text::stamped(frame, (now.as_millis() % MINUTE) as u16);
         for (index, client) in self.clients.iter_mut().enumerate() {
-            if !client.open || Some(index) == from {
+            if client.part == Part::Closed || Some(index) == from {
                 continue;
             }
+            let text = if client.stamps { stamped } else { plain };
             if client.output.len() + text.as_bytes().len() > QUEUE {
                 self.lost += 1;
             } else {
@@ -185,22 +220,27 @@ impl SlcanHub {
 }
 
 impl Client {
+    /// Whether it may be read: its answers have a place to wait in.
+    fn has_room(&self) -> bool {
+        self.output.len() < QUEUE
+    }
+
+    /// Reads one buffer, so that every client gets its turn.
     fn read(&mut self, may: Clients, mut frame: impl FnMut(CanFrame)) {
-        let mut buffer = [0; 4096];
-        loop {
-            match self.stream.read(&mut buffer) {
-                Ok(0) => self.gone = true,
-                Ok(count) => {
-                    for &byte in buffer.get(..count).unwrap_or_default() {
-                        if let Some(line) = self.parser.push(byte) {
-                            self.answer(line, may, &mut frame);
-                        }
-                    }
-                    continue;
-                }
-                Err(error) => self.judge(&error),
-            }
+        if !self.has_room() {
             return;
+        }
+        let mut buffer = [0; 4096];
+        match self.stream.read(&mut buffer) {
+            Ok(0) => self.gone = true,
+            Ok(count) => {
+                for &byte in buffer.get(..count).unwrap_or_default() {
+                    if let Some(line) = self.parser.push(byte) {
+                        self.answer(line, may, &mut frame);
+                    }
+                }
+            }
+            Err(error) => self.judge(&error),
         }
     }
 
@@ -212,25 +252,40 @@ impl Client {
         frame: &mut impl FnMut(CanFrame),
     ) {
         let reply = match line {
-            Ok(Line::Frame(sent)) if self.open && may == Clients::TakePart => {
+            Ok(Line::Frame(sent)) if self.part == Part::Open && may == Clients::TakePart => {
                 frame(sent);
                 Line::Empty
             }
-            Ok(Line::Open | Line::Listen) => {
-                self.open = true;
+            Ok(Line::Open) => self.takes(Part::Open),
+            Ok(Line::Listen) => self.takes(Part::Listening),
+            Ok(Line::Close) => self.takes(Part::Closed),
+            Ok(Line::Timestamps(on)) => {
+                self.stamps = on;
                 Line::Empty
             }
-            Ok(Line::Close) => {
-                self.open = false;
+            // The bit rates are not of this bus, and nobody is to be kept away by them. A filter is accepted where it lets
+            // everything pass (then its code means nothing), and frames come without being asked for.
+            Ok(
                 Line::Empty
-            }
-            // The bit rates are not of this bus, and nobody is to be kept away by them.
-            Ok(Line::Empty | Line::Bitrate(_) | Line::DataBitrate(_)) => Line::Empty,
+                | Line::Bitrate(_)
+                | Line::DataBitrate(_)
+                | Line::Timing
+                | Line::AcceptanceCode(_)
+                | Line::AcceptanceMask(u32::MAX)
+                | Line::AutoPoll(true),
+            ) => Line::Empty,
             Ok(Line::Version) => VERSION,
+            Ok(Line::SerialNumber) => SERIAL_NUMBER,
+            Ok(Line::Status) => Line::StatusIs(0),
             Ok(Line::Refused) => return,
             _ => Line::Refused,
         };
         self.output.extend(Text::from(reply).as_bytes());
+    }
+
+    fn takes(&mut self, part: Part) -> Line {
+        self.part = part;
+        Line::Empty
     }
 
     fn flush(&mut self) {

@@ -19,8 +19,21 @@ use protocol::slcan::{Line, MAX_LINE, Parser, Text};
 
 /// Bytes that may wait for the line: some 30 of the longest frames. More, and the bus is slower than its senders.
 const QUEUE: usize = 32 * MAX_LINE;
+/// Frames that may wait for this node; with more, the line is read no further.
+const RECEIVED: usize = 4096;
 /// Longest wait for a TCP server.
 const CONNECT_LIMIT: Duration = Duration::from_secs(3);
+
+/// What opens an adapter: 1 and 5 Mbit/s, no timestamps. The empty line first ends whatever a program before this one left
+/// unfinished.
+const OPENING: [Line; 6] = [
+    Line::Empty,
+    Line::Close,
+    Line::Bitrate(8),
+    Line::DataBitrate(5),
+    Line::Timestamps(false),
+    Line::Open,
+];
 
 #[derive(Debug)]
 enum Port {
@@ -56,7 +69,8 @@ impl AsFd for Port {
 /// An open adapter. The bus behind it runs at 1 Mbit/s nominal and 5 Mbit/s data bit rate.
 ///
 /// Acknowledgements of single frames are not waited for: an adapter that refuses a frame says so by BEL, which is
-/// counted ([`Self::refused`]).
+/// counted ([`Self::refused`]). So are lines that cannot be read; when the link is closed, standard error says how many
+/// there were, since they are frames that nobody has seen.
 #[derive(Debug)]
 pub struct SlcanPort {
     port: Port,
@@ -64,7 +78,10 @@ pub struct SlcanPort {
     parser: Parser,
     received: VecDeque<Stamped>,
     output: VecDeque<u8>,
+    /// Answers to the opening that are still due: what an adapter does not know of it, it may refuse.
+    opening: usize,
     refused: u64,
+    unreadable: u64,
     pub(super) failure: Option<LinkError>,
 }
 
@@ -85,27 +102,28 @@ impl SlcanPort {
             parser: Parser::new(),
             received: VecDeque::new(),
             output: VecDeque::new(),
+            opening: OPENING.len(),
             refused: 0,
+            unreadable: 0,
             failure: None,
         };
-        // An empty line first: it ends whatever a program before this one left unfinished.
-        for line in [
-            Line::Empty,
-            Line::Close,
-            Line::Bitrate(8),
-            Line::DataBitrate(5),
-            Line::Open,
-        ] {
+        for line in OPENING {
             link.output.extend(Text::from(line).as_bytes());
         }
         link.flush();
         Ok(link)
     }
 
-    /// Lines that the adapter has refused.
+    /// Frames that the adapter has refused.
     #[must_use]
     pub fn refused(&self) -> u64 {
         self.refused
+    }
+
+    /// Lines of the adapter that could not be read.
+    #[must_use]
+    pub fn unreadable(&self) -> u64 {
+        self.unreadable
     }
 
     pub(super) fn unsent(&self) -> usize {
@@ -149,6 +167,9 @@ impl SlcanPort {
     /// Moves bytes both ways as far as they go without waiting.
     fn exchange(&mut self) {
         self.flush();
+        if self.received.len() >= RECEIVED {
+            return;
+        }
         let mut buffer = [0; 4096];
         match self.port.read(&mut buffer) {
             // End of file: a TCP peer has gone, a terminal hung up.
@@ -160,9 +181,13 @@ impl SlcanPort {
                         Some(Ok(Line::Frame(frame))) => {
                             self.received.push_back(Stamped { frame, at });
                         }
+                        Some(Ok(Line::Refused | Line::Empty)) if self.opening > 0 => {
+                            self.opening -= 1;
+                        }
                         Some(Ok(Line::Refused)) => self.refused += 1,
-                        // Acknowledgements in the dialects of many adapters, and noise.
-                        Some(_) | None => {}
+                        Some(Err(_)) => self.unreadable += 1,
+                        // Acknowledgements and answers.
+                        Some(Ok(_)) | None => {}
                     }
                 }
             }
@@ -197,6 +222,17 @@ impl SlcanPort {
                 self.fail_closed();
             }
             _ => self.failure = Some(LinkError::io(format!("{what} {}", self.peer), error)),
+        }
+    }
+}
+
+impl Drop for SlcanPort {
+    fn drop(&mut self) {
+        if self.unreadable > 0 {
+            eprintln!(
+                "slcan:{}: {} lines of the adapter could not be read; frames among them are lost",
+                self.peer, self.unreadable
+            );
         }
     }
 }

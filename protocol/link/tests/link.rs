@@ -30,7 +30,7 @@ fn read(peer: &mut TcpStream, expected: &[u8]) {
     );
 }
 
-const OPENING: &[u8] = b"\rC\rS8\rY5\rO\r";
+const OPENING: &[u8] = b"\rC\rS8\rY5\rZ0\rO\r";
 
 #[test]
 fn addresses_read_back_as_they_were_written() {
@@ -93,7 +93,8 @@ fn serial_link_opens_its_adapter_and_carries_frames_both_ways() {
 
     // Acknowledgements, a refusal and noise around two frames, the second in two pieces.
     assert_eq!(link.receive(), None);
-    peer.write_all(b"\r\rz\r\x07garbage\rt24021122\rb1C0")
+    // The six lines of the opening are answered first, one of them by a refusal: the adapter knows no Z0.
+    peer.write_all(b"\r\r\r\r\x07\r\rz\r\x07garbage\rt240211220FA1\r\nb1C0")
         .unwrap();
     assert!(link.wait(LIMIT).unwrap());
     let first = CanFrame::classical(StandardId::new(0x240).unwrap(), &[0x11, 0x22]).unwrap();
@@ -108,7 +109,7 @@ fn serial_link_opens_its_adapter_and_carries_frames_both_ways() {
     let Link::Slcan(port) = &link else {
         unreachable!("opened as slcan");
     };
-    assert_eq!(port.refused(), 1);
+    assert_eq!((port.refused(), port.unreadable()), (1, 1));
 }
 
 #[test]
@@ -186,10 +187,12 @@ fn a_hub_to_watch_refuses_frames_and_answers_like_an_adapter() {
         unreachable!("made so");
     };
     let mut peer = TcpStream::connect(server).unwrap();
-    // As python-can opens a bus.
-    peer.write_all(b"C\rS8\r\rO\rV\rN\rt1230\r?\r").unwrap();
+    // As python-can opens a bus; then what other programs ask, with line ends of theirs.
+    peer.write_all(b"C\rS8\r\rO\rV\rN\rF\rt1230\r?\r").unwrap();
+    peer.write_all(b"Z0\r\nM00000000\r\nmFFFFFFFF\r\nm00000000\r\ns031C\r\nX1\r\nX0\r\n")
+        .unwrap();
     peer.set_nonblocking(true).unwrap();
-    let expected = b"\r\r\r\rV1010\r\x07\x07\x07";
+    let expected = b"\r\r\r\rV1010\rN0001\rF00\r\x07\x07\r\r\r\x07\r\r\x07";
     let mut answer: Vec<u8> = Vec::new();
     while answer.len() < expected.len() {
         hub.exchange();
@@ -200,4 +203,109 @@ fn a_hub_to_watch_refuses_frames_and_answers_like_an_adapter() {
         }
     }
     assert_eq!(answer, expected);
+}
+
+/// What a client hears until `expected` has come.
+fn heard(hub: &mut SlcanHub, peer: &mut TcpStream, expected: &[u8]) {
+    peer.set_nonblocking(true).unwrap();
+    let mut answer: Vec<u8> = Vec::new();
+    while answer.len() < expected.len() {
+        hub.exchange();
+        let mut buffer = [0; 64];
+        match peer.read(&mut buffer) {
+            Ok(count) => answer.extend(&buffer[..count]),
+            Err(error) => assert_eq!(error.kind(), std::io::ErrorKind::WouldBlock),
+        }
+    }
+    assert_eq!(
+        answer.escape_ascii().to_string(),
+        expected.escape_ascii().to_string()
+    );
+}
+
+fn connect(address: &LinkAddress) -> TcpStream {
+    let LinkAddress::Slcan(SlcanPeer::Tcp(server)) = address else {
+        unreachable!("made so");
+    };
+    TcpStream::connect(server).unwrap()
+}
+
+#[test]
+fn a_client_that_listens_only_cannot_send() {
+    let (mut hub, address) = hub(Clients::TakePart);
+    let (mut listener, mut other) = (connect(&address), connect(&address));
+    other.write_all(b"O\r").unwrap();
+    heard(&mut hub, &mut other, b"\r");
+    listener.write_all(b"L\rt0010\rO\rt0020\r").unwrap();
+    heard(&mut hub, &mut listener, b"\r\x07\r\r");
+    // Of the two, only the frame of the open channel is spread.
+    heard(&mut hub, &mut other, b"t0020\r");
+    let mut link = Link::SlcanHub(hub);
+    let frame = CanFrame::classical(StandardId::new(2).unwrap(), &[]).unwrap();
+    assert_eq!(link.receive(), Some(frame));
+    assert_eq!(link.receive(), None);
+}
+
+#[test]
+fn clients_come_and_go_while_others_listen_and_get_timestamps_if_they_ask() {
+    let (mut hub, address) = hub(Clients::Watch);
+    let mut first = connect(&address);
+    first.write_all(b"O\r").unwrap();
+    heard(&mut hub, &mut first, b"\r");
+    let mut second = connect(&address);
+    second.write_all(b"Z1\rO\r").unwrap();
+    heard(&mut hub, &mut second, b"\r\r");
+    let frame = CanFrame::classical(StandardId::new(0x123).unwrap(), &[0xAB]).unwrap();
+    hub.transmit(&frame).unwrap();
+    heard(&mut hub, &mut first, b"t1231AB\r");
+    let mut stamped = [0; 12];
+    second.set_nonblocking(false).unwrap();
+    second.read_exact(&mut stamped).unwrap();
+    assert!(stamped.starts_with(b"t1231AB") && stamped.ends_with(b"\r"));
+    let milliseconds = std::str::from_utf8(&stamped[7..11]).unwrap();
+    assert!(u16::from_str_radix(milliseconds, 16).unwrap() < 60_000);
+    // Closed, it hears nothing but its answer, and the other goes on.
+    first.write_all(b"C\r").unwrap();
+    heard(&mut hub, &mut first, b"\r");
+    hub.transmit(&frame).unwrap();
+    first.write_all(b"V\r").unwrap();
+    heard(&mut hub, &mut first, b"V1010\r");
+    drop(first);
+    second.read_exact(&mut stamped).unwrap();
+    while hub.is_open() {
+        second.shutdown(std::net::Shutdown::Both).unwrap();
+        hub.exchange();
+    }
+}
+
+/// A client that sends as fast as it can, and reads no answer: it is held back, and the node always comes to an end.
+#[test]
+fn a_flood_is_held_back() {
+    for may in [Clients::TakePart, Clients::Watch] {
+        let (hub, address) = hub(may);
+        let mut flood = connect(&address);
+        flood.write_all(b"O\r").unwrap();
+        flood.set_nonblocking(true).unwrap();
+        let lines = b"t0000\r".repeat(10_000);
+        let mut link = Link::SlcanHub(hub);
+        let mut sent = 0;
+        let mut stalled = 0;
+        // Nobody takes a frame or reads an answer: some buffers are filled, then nothing more goes.
+        while stalled < 200 {
+            match flood.write(&lines) {
+                Ok(count) => (sent, stalled) = (sent + count, 0),
+                Err(error) => {
+                    assert_eq!(error.kind(), std::io::ErrorKind::WouldBlock);
+                    stalled += 1;
+                }
+            }
+            link.wait(Duration::from_millis(1)).unwrap();
+            assert!(sent < 1 << 26, "{sent} bytes taken");
+        }
+        // What waits is bounded, and one turn takes all of it.
+        assert!(link.unsent() < 4096 * 139 + 4096);
+        let waiting = std::iter::from_fn(|| link.receive()).count();
+        assert!(waiting <= 4096 + 4096 / 6 + 1, "{waiting}");
+        assert_eq!(waiting > 0, may == Clients::TakePart);
+    }
 }

@@ -91,6 +91,18 @@ impl BitTiming {
         })
     }
 
+    /// Nominal bit rate, bit/s.
+    #[must_use]
+    pub const fn nominal(&self) -> u32 {
+        self.nominal
+    }
+
+    /// Data bit rate, bit/s.
+    #[must_use]
+    pub const fn data(&self) -> u32 {
+        self.data
+    }
+
     /// How long so many bits take; either phase rounded up to a whole ns.
     #[must_use]
     pub fn duration(&self, bits: FrameBits) -> Duration {

@@ -3,38 +3,84 @@
 use std::cell::Cell;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
+use std::os::fd::AsFd;
 use std::path::Path;
-use std::process::ExitCode;
+use std::process::{self, ExitCode};
 use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use flate2::read::MultiGzDecoder;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use trace::select::Selection;
 use trace::{Problem, ReadError, Reader, Record};
 
 /// Unreadable lines that are shown; of more, only the number is.
 const SHOWN: u64 = 10;
 /// Records between two looks at the clock.
 const LOOK: u64 = 1 << 14;
+/// Between two looks for a signal while there is nothing to read.
+const WATCH: Timespec = Timespec {
+    tv_sec: 0,
+    tv_nsec: 100_000_000,
+};
+/// What gzip begins with.
+const GZIP: &[u8] = b"\x1F\x8B";
+/// Exit code where there was nothing to judge: neither good (0) nor bad (1).
+const NOTHING_JUDGED: u8 = 3;
+/// Exit code of a process that its second Ctrl-C ended.
+const INTERRUPTED: i32 = 130;
+
+/// Whether a signal has asked for the end.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// From now on a signal (Ctrl-C, SIGTERM) ends the trace as if its file ended, so that what was gathered until then is
+/// shown. A second one ends the process.
+pub fn finish_on_signal() -> Result<(), String> {
+    ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::Relaxed) {
+            process::exit(INTERRUPTED);
+        }
+    })
+    .map_err(|error| format!("cannot take signals: {error}"))
+}
 
 /// A trace that is read from front to end, with its progress on standard error.
 pub struct Source {
     name: String,
-    reader: Reader<BufReader<Counted>>,
+    reader: Reader<BufReader<Box<dyn Read>>>,
+    selection: Selection,
     /// Bytes read, and bytes there are if that is known.
     bytes: Rc<Cell<u64>>,
     size: Option<u64>,
+    first_us: Option<u64>,
     records: u64,
+    selected: u64,
     unreadable: u64,
+    /// Why the file could not be read to its end.
+    failure: Option<String>,
     shown: Instant,
 }
 
-/// An input that counts what is read from it.
+/// An input that counts what is read from it, and that ends on a signal.
 struct Counted {
-    input: Box<dyn Read>,
+    input: File,
     bytes: Rc<Cell<u64>>,
 }
 
 impl Read for Counted {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            if STOP.load(Ordering::Relaxed) {
+                return Ok(0);
+            }
+            let mut input = [PollFd::new(&self.input, PollFlags::IN)];
+            match poll(&mut input, Some(&WATCH)) {
+                Ok(0) | Err(rustix::io::Errno::INTR) => {}
+                Ok(_) => break,
+                Err(error) => return Err(error.into()),
+            }
+        }
         let read = self.input.read(buffer)?;
         self.bytes.set(self.bytes.get() + read as u64);
         Ok(read)
@@ -42,53 +88,85 @@ impl Read for Counted {
 }
 
 impl Source {
-    pub fn open(path: &Path) -> Result<Self, String> {
+    pub fn open(path: &Path, selection: Selection) -> Result<Self, String> {
         let mut name = path.display().to_string();
-        let (input, size): (Box<dyn Read>, _) = if path == Path::new("-") {
+        let failed = |error: io::Error| format!("cannot read {}: {error}", path.display());
+        let input = input(path).map_err(failed)?;
+        if path == Path::new("-") {
             name = "standard input".into();
-            (Box::new(io::stdin()), None)
-        } else {
-            let file = File::open(path).map_err(|error| format!("cannot read {name}: {error}"))?;
-            let size = file.metadata().map(|data| data.len()).ok();
-            (Box::new(file), size.filter(|&size| size > 0))
-        };
+        }
+        let data = input.metadata().map_err(failed)?;
+        if data.is_dir() {
+            return Err(format!("cannot read {name}: it is a folder"));
+        }
         let bytes = Rc::new(Cell::new(0));
-        let input = Counted {
+        let mut input = Counted {
             input,
             bytes: Rc::clone(&bytes),
+        };
+        let mut head = Vec::new();
+        input
+            .by_ref()
+            .take(GZIP.len() as u64)
+            .read_to_end(&mut head)
+            .map_err(failed)?;
+        let packed = head == GZIP;
+        let input = io::Cursor::new(head).chain(input);
+        let input: Box<dyn Read> = if packed {
+            Box::new(MultiGzDecoder::new(input))
+        } else {
+            Box::new(input)
         };
         Ok(Self {
             name,
             reader: Reader::new(BufReader::with_capacity(1 << 16, input)),
+            selection,
             bytes,
-            size,
+            size: Some(data.len()).filter(|&size| size > 0),
+            first_us: None,
             records: 0,
+            selected: 0,
             unreadable: 0,
+            failure: None,
             shown: Instant::now(),
         })
     }
 
-    /// The next line as it is; `Err` if the file cannot be read.
-    pub fn line(&mut self) -> Result<Option<Result<Record, Problem>>, String> {
-        self.progress();
-        match self.reader.next() {
-            None => Ok(None),
-            Some(Ok(record)) => {
-                self.records += 1;
-                Ok(Some(Ok(record)))
+    /// The next line of an interface that counts; `None` at the end.
+    pub fn line(&mut self) -> Option<Result<Record, Problem>> {
+        loop {
+            self.progress();
+            match self.reader.next()? {
+                Ok(record) => {
+                    self.records += 1;
+                    self.first_us.get_or_insert(record.time_us);
+                    if self.selection.interface(&record) {
+                        self.selected += u64::from(self.counts(&record));
+                        return Some(Ok(record));
+                    }
+                }
+                Err(_) if STOP.load(Ordering::Relaxed) => return None,
+                Err(ReadError::Line {
+                    problem: problem @ Problem::Unterminated,
+                    ..
+                }) => {
+                    eprintln!("plant-sim: {}: {problem}; it is left out", self.place());
+                }
+                Err(ReadError::Line { problem, .. }) => return Some(Err(problem)),
+                Err(error @ ReadError::Io { .. }) => {
+                    self.failure = Some(format!("{}: {error}", self.name));
+                    return None;
+                }
             }
-            Some(Err(ReadError::Line { problem, .. })) => Ok(Some(Err(problem))),
-            Some(Err(error @ ReadError::Io { .. })) => Err(format!("{}: {error}", self.name)),
         }
     }
 
-    /// The next record; lines that cannot be read are named on standard error and left out.
-    pub fn record(&mut self) -> Result<Option<Record>, String> {
+    /// The next record of an interface that counts; lines that cannot be read are named on standard error and left out.
+    pub fn record_of_interface(&mut self) -> Option<Record> {
         loop {
             match self.line()? {
-                None => return Ok(None),
-                Some(Ok(record)) => return Ok(Some(record)),
-                Some(Err(problem)) => {
+                Ok(record) => return Some(record),
+                Err(problem) => {
                     self.unreadable += 1;
                     if self.unreadable <= SHOWN {
                         eprintln!("plant-sim: {}: {problem}", self.place());
@@ -98,26 +176,63 @@ impl Source {
         }
     }
 
+    /// The next record that counts in every respect.
+    pub fn record(&mut self) -> Option<Record> {
+        loop {
+            let record = self.record_of_interface()?;
+            if self.counts(&record) {
+                return Some(record);
+            }
+        }
+    }
+
+    /// Whether the record has an identifier and a time that count.
+    pub fn counts(&self, record: &Record) -> bool {
+        let first_us = self.first_us.unwrap_or(record.time_us);
+        self.selection.id(record) && self.selection.time(record, first_us)
+    }
+
+    /// Whether the next record has to be waited for.
+    pub fn is_drained(&self) -> bool {
+        !self.reader.source().buffer().contains(&b'\n')
+    }
+
     /// File and line read last.
     pub fn place(&self) -> String {
         format!("{}:{}", self.name, self.reader.line())
     }
 
-    /// Success only if every line could be read.
+    /// Success only if there was something and every line could be read.
     pub fn verdict(&self) -> Result<ExitCode, String> {
+        if let Some(failure) = &self.failure {
+            return Err(failure.clone());
+        }
         match self.unreadable {
+            0 if self.selected == 0 => Ok(self.nothing("the log is empty")),
             0 => Ok(ExitCode::SUCCESS),
             lines => Err(format!(
-                "{}: {lines} of {} lines could not be read",
-                self.name,
-                self.reader.line() - 1
+                "{}: {lines} lines could not be read, {} could",
+                self.name, self.records
             )),
         }
     }
 
+    /// Says that nothing was judged, and why: what is selected is not there, or `what`.
+    pub fn nothing(&self, what: &str) -> ExitCode {
+        let name = &self.name;
+        match (self.selected, self.records) {
+            (0, records @ 1..) => {
+                eprintln!(
+                    "plant-sim: {name}: nothing judged: none of {records} records is selected"
+                );
+            }
+            _ => eprintln!("plant-sim: {name}: nothing judged: {what}"),
+        }
+        ExitCode::from(NOTHING_JUDGED)
+    }
+
     fn progress(&mut self) {
-        if !self.reader.line().is_multiple_of(LOOK) || self.shown.elapsed() < Duration::from_secs(2)
-        {
+        if !self.records.is_multiple_of(LOOK) || self.shown.elapsed() < Duration::from_secs(2) {
             return;
         }
         self.shown = Instant::now();
@@ -125,5 +240,14 @@ impl Source {
             format!(" ({:.0} %)", self.bytes.get() as f64 / size as f64 * 100.0)
         });
         eprintln!("{}: {} frames{share}", self.name, self.records);
+    }
+}
+
+/// The file, or standard input for `-`: without a buffer of its own, so that it can be waited for.
+pub fn input(path: &Path) -> io::Result<File> {
+    if path == Path::new("-") {
+        io::stdin().as_fd().try_clone_to_owned().map(File::from)
+    } else {
+        File::open(path)
     }
 }

@@ -1,13 +1,15 @@
-//! Vector ASC: the text log of CANalyzer and CANoe. Times count from the first record, whose date is in the header.
+//! Vector ASC: the text log of CANalyzer and CANoe. Times count from the date in the header, which is that of the first
+//! record in local time, as its readers take it, and in whole milliseconds: the first time holds the rest.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
+use chrono::{DateTime, Local};
 use protocol::frame::{CanFrame, FrameKind};
 
 use super::Interfaces;
 use crate::decode::Seconds;
-use crate::{Entry, Record};
+use crate::{Direction, Entry, Record};
 
 /// Flags of a `CANFD` line: FD format, bit rate switch, error state indicator.
 const FLAG_FDF: u32 = 1 << 12;
@@ -16,7 +18,7 @@ const FLAG_ESI: u32 = 1 << 14;
 
 /// An ASC file.
 pub struct Asc<W> {
-    sink: W,
+    pub(super) sink: W,
     interfaces: Interfaces,
     start_us: Option<u64>,
 }
@@ -34,16 +36,17 @@ impl<W: Write> Asc<W> {
         let start_us = match self.start_us {
             Some(start_us) => start_us,
             None => {
-                self.start_us = Some(record.time_us);
-                self.header(record.time_us)?;
-                record.time_us
+                let start_us = record.time_us / 1000 * 1000;
+                self.start_us = Some(start_us);
+                self.header(start_us)?;
+                start_us
             }
         };
         // Channels are counted from 1. A clock that was set back before the start stays at the start.
         let channel = self.interfaces.number(record.interface).0 + 1;
         let time = Seconds(record.time_us.saturating_sub(start_us)).to_string();
         let content = match &record.entry {
-            Entry::Frame(frame) => frame_line(channel, frame),
+            Entry::Frame(frame) => frame_line(channel, record.direction, frame),
             Entry::Error(_) => format!("{channel}  ErrorFrame"),
         };
         writeln!(self.sink, "{time:>11} {content}")
@@ -58,7 +61,7 @@ impl<W: Write> Asc<W> {
     }
 
     fn header(&mut self, start_us: u64) -> io::Result<()> {
-        let date = date(start_us);
+        let date = date(&local(start_us));
         writeln!(
             self.sink,
             "date {date}\nbase hex  timestamps absolute\ninternal events logged\n\
@@ -67,19 +70,20 @@ impl<W: Write> Asc<W> {
     }
 }
 
-fn frame_line(channel: usize, frame: &CanFrame) -> String {
+fn frame_line(channel: usize, direction: Option<Direction>, frame: &CanFrame) -> String {
+    let way = direction.unwrap_or(Direction::Received).name();
     let extended = if frame.is_extended() { "x" } else { "" };
     let id = format!("{:X}{extended}", frame.raw_id());
     let length = frame.data().len();
     let mut line = match frame.kind() {
         FrameKind::Classical { remote: false } => {
-            format!("{channel}  {id:<15} Rx   d {length:x}")
+            format!("{channel}  {id:<15} {way}   d {length:x}")
         }
         FrameKind::Classical { remote: true } => {
-            return format!("{channel}  {id:<15} Rx   r {:x}", frame.dlc());
+            return format!("{channel}  {id:<15} {way}   r {:x}", frame.dlc());
         }
         FrameKind::Fd { brs, esi } => format!(
-            "CANFD {channel:>3} Rx   {id:>8} {:>32} {} {} {:x} {length:>2}",
+            "CANFD {channel:>3} {way}   {id:>8} {:>32} {} {} {:x} {length:>2}",
             "",
             u8::from(brs),
             u8::from(esi),
@@ -102,51 +106,37 @@ fn frame_line(channel: usize, frame: &CanFrame) -> String {
     line
 }
 
-/// UTC date of a time since 1970: `Thu Jan 01 00:00:00.000 1970`.
-fn date(time_us: u64) -> String {
-    const WEEKDAYS: [&str; 7] = ["Thu", "Fri", "Sat", "Sun", "Mon", "Tue", "Wed"];
-    const MONTHS: [&str; 12] = [
-        "Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec",
-    ];
-    let milliseconds = time_us / 1000;
-    let (days, of_day) = (milliseconds / 86_400_000, milliseconds % 86_400_000);
-    // Years of 400-year cycles that begin in March, so that the leap day is the last of a year.
-    let since_march = days + 719_468;
-    let (cycle, day) = (since_march / 146_097, since_march % 146_097);
-    let year_of_cycle = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day_of_year = day - (365 * year_of_cycle + year_of_cycle / 4 - year_of_cycle / 100);
-    let month_from_march = (5 * day_of_year + 2) / 153;
-    let day_of_month = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = (month_from_march + 2) % 12;
-    let year = 400 * cycle + year_of_cycle + u64::from(month < 2);
-    format!(
-        "{} {} {day_of_month:02} {:02}:{:02}:{:02}.{:03} {year}",
-        WEEKDAYS[(days % 7) as usize],
-        MONTHS[month as usize],
-        of_day / 3_600_000,
-        of_day / 60_000 % 60,
-        of_day / 1000 % 60,
-        of_day % 1000
-    )
+/// Local time of a time since 1970; one that no calendar has is taken for its start.
+fn local(time_us: u64) -> DateTime<Local> {
+    let time = i64::try_from(time_us)
+        .ok()
+        .and_then(DateTime::from_timestamp_micros);
+    time.unwrap_or_default().with_timezone(&Local)
+}
+
+/// `Thu Jan 01 00:00:00.000 1970`.
+fn date(time: &DateTime<impl chrono::TimeZone<Offset: std::fmt::Display>>) -> String {
+    time.format("%a %b %d %H:%M:%S%.3f %Y").to_string()
 }
 
 #[cfg(test)]
 mod tests {
     use super::date;
+    use chrono::DateTime;
 
     /// Values of GNU date: `date -u -d @SECONDS`.
     #[test]
     fn dates_are_those_of_the_calendar() {
+        let utc = |time_us| date(&DateTime::from_timestamp_micros(time_us).unwrap());
         for (seconds, expected) in [
             (0, "Thu Jan 01 00:00:00.000 1970"),
             (951_782_399, "Mon Feb 28 23:59:59.000 2000"),
             (951_782_400, "Tue Feb 29 00:00:00.000 2000"),
-            (951_868_800, "Wed Mar 01 00:00:00.000 2000"),
             (1_735_689_599, "Tue Dec 31 23:59:59.000 2024"),
             (4_107_542_400, "Mon Mar 01 00:00:00.000 2100"),
         ] {
-            assert_eq!(date(seconds * 1_000_000), expected);
+            assert_eq!(utc(seconds * 1_000_000), expected);
         }
-        assert_eq!(date(1_436_509_052_249_713), "Fri Jul 10 06:17:32.249 2015");
+        assert_eq!(utc(1_436_509_052_249_000), "Fri Jul 10 06:17:32.249 2015");
     }
 }

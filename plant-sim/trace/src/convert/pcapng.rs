@@ -5,24 +5,28 @@ use std::io::{self, Write};
 use protocol::frame::{CanFrame, FrameKind};
 
 use super::Interfaces;
-use crate::{ERROR_FLAG, Entry, FLAG_BRS, FLAG_ESI, FLAG_FDF, Interface, Record};
+use crate::{Direction, ERROR_FLAG, Entry, FLAG_BRS, FLAG_ESI, FLAG_FDF, Interface, Record};
 
-const SECTION_HEADER: u32 = 0x0A0D_0D0A;
-const INTERFACE_DESCRIPTION: u32 = 1;
-const ENHANCED_PACKET: u32 = 6;
-const BYTE_ORDER_MAGIC: u32 = 0x1A2B_3C4D;
+pub(crate) const SECTION_HEADER: u32 = 0x0A0D_0D0A;
+pub(crate) const INTERFACE_DESCRIPTION: u32 = 1;
+pub(crate) const ENHANCED_PACKET: u32 = 6;
+pub(crate) const BYTE_ORDER_MAGIC: u32 = 0x1A2B_3C4D;
 /// Of a section that is written as it comes.
 const UNKNOWN_LENGTH: u64 = u64::MAX;
-const LINKTYPE_CAN_SOCKETCAN: u16 = 227;
+pub(crate) const LINKTYPE_CAN_SOCKETCAN: u16 = 227;
 /// Option of an interface: its name.
-const IF_NAME: u16 = 2;
+pub(crate) const IF_NAME: u16 = 2;
+/// Option of a packet: its flags, of which the low two bits are its direction.
+pub(crate) const PACKET_FLAGS: u16 = 2;
+pub(crate) const DIRECTION_IN: u32 = 1;
+pub(crate) const DIRECTION_OUT: u32 = 2;
 /// SocketCAN identifier bits: 29 bits, remote.
-const EXTENDED_FLAG: u32 = 0x8000_0000;
-const REMOTE_FLAG: u32 = 0x4000_0000;
+pub(crate) const EXTENDED_FLAG: u32 = 0x8000_0000;
+pub(crate) const REMOTE_FLAG: u32 = 0x4000_0000;
 
 /// A pcapng file of one section. Timestamps count microseconds, the resolution of the format unless told otherwise.
 pub struct Pcapng<W> {
-    sink: W,
+    pub(super) sink: W,
     interfaces: Interfaces,
     block: Vec<u8>,
 }
@@ -50,7 +54,12 @@ impl<W: Write> Pcapng<W> {
         }
         let packet = match &record.entry {
             Entry::Frame(frame) => frame_packet(frame),
-            Entry::Error(error) => packet(error.class | ERROR_FLAG, 8, 0, &error.data),
+            Entry::Error(error) => packet(
+                error.class | ERROR_FLAG,
+                error.data().len() as u8,
+                0,
+                error.data(),
+            ),
         };
         let length = packet.len() as u32;
         self.put((number as u32).to_le_bytes());
@@ -60,6 +69,17 @@ impl<W: Write> Pcapng<W> {
         self.put(length.to_le_bytes());
         self.put(length.to_le_bytes());
         self.block.extend(packet);
+        if let Some(direction) = record.direction {
+            self.pad();
+            self.put(PACKET_FLAGS.to_le_bytes());
+            self.put(4_u16.to_le_bytes());
+            self.put(match direction {
+                Direction::Received => DIRECTION_IN.to_le_bytes(),
+                Direction::Transmitted => DIRECTION_OUT.to_le_bytes(),
+            });
+            // End of options.
+            self.put(0_u32.to_le_bytes());
+        }
         self.end_block(ENHANCED_PACKET)
     }
 

@@ -1,0 +1,255 @@
+//! What the subcommands of `trace` are told.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use link::LinkAddress;
+use protocol::wire::BitTiming;
+use trace::Interface;
+use trace::convert::Target;
+use trace::select::{Ids, Moment, Selection};
+
+/// A trace, and which of its records count.
+#[derive(Args)]
+pub struct InputArgs {
+    /// candump log, candump's screen output, Vector ASC or pcapng, also with gzip; - for standard input.
+    pub file: PathBuf,
+    /// Only these identifiers: hexadecimal, 3 digits (11 bits) or 8 (29 bits), a range (300-3FF) or a message's name.
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    id: Vec<Ids>,
+    /// Only these interfaces.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = interface)]
+    interface: Vec<Interface>,
+    /// Only from this time on: seconds as the trace has them, or after its first record (+12.5).
+    #[arg(long, value_name = "S")]
+    from: Option<Moment>,
+}
+
+impl InputArgs {
+    pub fn selection(&self, to: Option<Moment>) -> Selection {
+        Selection {
+            ids: self.id.clone(),
+            interfaces: self.interface.clone(),
+            from: self.from,
+            to,
+        }
+    }
+}
+
+/// The end of what counts; apart from [`InputArgs`], since `convert` calls its format so, too.
+#[derive(Args)]
+pub struct EndArgs {
+    /// Only up to this time: seconds as the trace has them, or after its first record (+12.5).
+    #[arg(long, value_name = "S")]
+    pub to: Option<Moment>,
+}
+
+fn interface(text: &str) -> Result<Interface, String> {
+    Interface::new(text).ok_or_else(|| {
+        format!(
+            "allowed: 1 to {} printable characters without blanks",
+            Interface::MAX
+        )
+    })
+}
+
+/// Bit rates of the recorded bus.
+pub fn bit_timing(text: &str) -> Result<BitTiming, String> {
+    let rate = |text: &str| {
+        let (digits, unit) = match text.strip_suffix(['k', 'K']) {
+            Some(digits) => (digits, 1e3),
+            None => text
+                .strip_suffix('M')
+                .map_or((text, 1.0), |digits| (digits, 1e6)),
+        };
+        let rate = digits.parse::<f64>().ok()? * unit;
+        (rate >= 1.0 && rate <= f64::from(u32::MAX) && rate.fract() == 0.0).then_some(rate as u32)
+    };
+    let (nominal, data) = text.split_once(',').unwrap_or((text, text));
+    match (rate(nominal), rate(data)) {
+        (Some(nominal), Some(data)) => {
+            BitTiming::new(nominal, data, 800).map_err(|error| error.to_string())
+        }
+        _ => Err(
+            "allowed: bit/s, nominal and after a comma of the data phase (500k, 500k,2M)".into(),
+        ),
+    }
+}
+
+/// Seconds that are skipped or waited for.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: Option<f64> = text.parse().ok();
+    seconds
+        .filter(|seconds| *seconds >= 0.0)
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
+        .ok_or_else(|| "allowed: seconds, 0 or more".into())
+}
+
+/// Arguments of `decode`.
+#[derive(Args)]
+pub struct DecodeArgs {
+    #[command(flatten)]
+    pub input: InputArgs,
+    #[command(flatten)]
+    pub end: EndArgs,
+    /// How it is written.
+    #[arg(long, value_name = "FORMAT", default_value = "text")]
+    pub format: FormatChoice,
+    /// Write to this file instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub enum FormatChoice {
+    /// A line for each frame.
+    Text,
+    /// A row for each field.
+    Csv,
+    /// An object for each frame.
+    Jsonl,
+}
+
+/// Arguments of `stats`.
+#[derive(Args)]
+pub struct StatsArgs {
+    #[command(flatten)]
+    pub input: InputArgs,
+    #[command(flatten)]
+    pub end: EndArgs,
+    /// Bit rates of the bus, bit/s, for its load: nominal, and after a comma that of the data phase (500k,2M).
+    #[arg(long, value_name = "N[,D]", default_value = "1M,5M", value_parser = bit_timing)]
+    pub bitrate: BitTiming,
+    /// Leave out times without any record that are longer than this, as when a clock was set.
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub skip_gaps: Option<Duration>,
+    /// Draw how the periods of each identifier are distributed.
+    #[arg(long, conflicts_with = "json")]
+    pub histogram: bool,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `plot`.
+#[derive(Args)]
+pub struct PlotArgs {
+    #[command(flatten)]
+    pub input: InputArgs,
+    #[command(flatten)]
+    pub end: EndArgs,
+    /// The robot (a model file); turns encoder counts into joint positions.
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+    /// Write to this file instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `check`.
+#[derive(Args)]
+pub struct CheckArgs {
+    /// The whole trace is followed; offences of what is not selected are passed over.
+    #[command(flatten)]
+    pub input: InputArgs,
+    #[command(flatten)]
+    pub end: EndArgs,
+    /// The robot (a model file); its motors limit the torque.
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+}
+
+/// Arguments of `replay`.
+#[derive(Args)]
+pub struct ReplayArgs {
+    /// For the controller the trace must begin before its first sample; it gets all of it, and what is selected is
+    /// compared.
+    #[command(flatten)]
+    pub input: InputArgs,
+    #[command(flatten)]
+    pub end: EndArgs,
+    /// The robot that the recorded controller believed in (a model file).
+    #[arg(long, value_name = "FILE", conflicts_with = "bus")]
+    pub model: Option<PathBuf>,
+    /// Control rate of the recorded controller.
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 1000.0,
+        conflicts_with = "bus"
+    )]
+    pub rate: f64,
+    /// Bit rates of the recorded bus, bit/s, from which the controller knows when its commands act (1M,5M).
+    #[arg(long, value_name = "N[,D]", default_value = "1M,5M", value_parser = bit_timing, conflicts_with = "bus")]
+    pub bitrate: BitTiming,
+    /// Play every frame onto this bus instead: socketcan:INTERFACE, slcan:TERMINAL, slcan:tcp:HOST:PORT or
+    /// slcan:listen:HOST:PORT.
+    #[arg(long, value_name = "BUS")]
+    pub bus: Option<LinkAddress>,
+    /// How many times as fast as recorded; 0: as fast as the bus takes the frames.
+    #[arg(long, value_name = "X", default_value_t = 1.0, requires = "bus", allow_negative_numbers = true, value_parser = speed)]
+    pub speed: f64,
+    /// Do not wait through recorded times without any record that are longer than this.
+    #[arg(long, value_name = "S", requires = "bus", value_parser = seconds)]
+    pub skip_gaps: Option<Duration>,
+}
+
+/// A speed at which every time of a trace stays a time.
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(speed) if speed == 0.0 || (0.001..=1000.0).contains(&speed) => Ok(speed),
+        _ => Err("allowed: 0, or 0.001 to 1000".into()),
+    }
+}
+
+/// Arguments of `convert`.
+#[derive(Args)]
+pub struct ConvertArgs {
+    #[command(flatten)]
+    pub input: InputArgs,
+    /// What it becomes: pcapng (Wireshark, tshark), asc (CANalyzer, CANoe) or candump (can-utils, python-can); and, as a
+    /// number, only up to this time.
+    #[arg(long, value_name = "FORMAT|S", required = true, value_parser = goal)]
+    to: Vec<Goal>,
+    /// Write to this file instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// What `convert --to` says.
+#[derive(Clone, Copy)]
+enum Goal {
+    Format(Target),
+    End(Moment),
+}
+
+fn goal(text: &str) -> Result<Goal, String> {
+    match text {
+        "pcapng" => Ok(Goal::Format(Target::Pcapng)),
+        "asc" => Ok(Goal::Format(Target::Asc)),
+        "candump" => Ok(Goal::Format(Target::Candump)),
+        _ => text.parse().map(Goal::End).map_err(|error| {
+            format!("allowed: a format (pcapng, asc, candump) or a time; of a time: {error}")
+        }),
+    }
+}
+
+impl ConvertArgs {
+    /// The one format, and the end if there is one.
+    pub fn goals(&self) -> Result<(Target, Option<Moment>), String> {
+        let (mut formats, mut ends) = (Vec::new(), Vec::new());
+        for goal in &self.to {
+            match goal {
+                Goal::Format(target) => formats.push(*target),
+                Goal::End(moment) => ends.push(*moment),
+            }
+        }
+        match (formats.as_slice(), ends.as_slice()) {
+            ([target], []) => Ok((*target, None)),
+            ([target], [end]) => Ok((*target, Some(*end))),
+            ([], _) => Err("--to says no format; allowed: pcapng, asc, candump".into()),
+            _ => Err("--to says more than one format or one time".into()),
+        }
+    }
+}

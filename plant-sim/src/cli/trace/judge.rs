@@ -1,0 +1,160 @@
+//! `trace check` and `trace replay`: traces held against the rules, a controller or a bus.
+
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use firmware::mechanics::arm::ArmModel;
+use link::{Link, LinkAddress, SlcanPeer};
+use plant_sim::check::{Checker, Counts};
+use plant_sim::play::{Pace, PlayError, Player};
+use plant_sim::replay::Replay;
+use protocol::time::Period;
+use sim::model::RobotModel;
+use sim::rig::RigConfig;
+use sim::scenario;
+use trace::Interface;
+
+use super::args::{CheckArgs, ReplayArgs};
+use super::source::{Source, finish_on_signal};
+use crate::cli::run::load;
+use crate::cli::show;
+
+/// A wait of the player that is worth a word.
+const LONG: Duration = Duration::from_secs(1);
+
+/// Every interface is a bus of its own.
+type PerInterface<T> = BTreeMap<Interface, T>;
+
+/// Where an offence is: file and line, and the interface if there are several.
+fn place<T>(source: &Source, interface: Interface, all: &PerInterface<T>) -> String {
+    if all.len() > 1 {
+        format!("{}: {interface}", source.place())
+    } else {
+        source.place()
+    }
+}
+
+pub fn check(args: &CheckArgs) -> Result<ExitCode, String> {
+    finish_on_signal()?;
+    let arm = ArmModel::from(&load(args.model.as_ref())?);
+    let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
+    let mut checkers: PerInterface<Checker> = BTreeMap::new();
+    let mut counts = Counts::default();
+    while let Some(line) = source.line() {
+        let record = line.map_err(|problem| format!("{}: {problem}", source.place()))?;
+        let interface = record.interface;
+        let checker = checkers
+            .entry(interface)
+            .or_insert_with(|| Checker::new(&arm));
+        let before = checker.counts();
+        let judged = checker.record(&record);
+        if source.counts(&record) {
+            counts = counts.plus(checker.counts().minus(before));
+            judged.map_err(|offence| {
+                format!("{}: {offence}", place(&source, interface, &checkers))
+            })?;
+        }
+    }
+    let verdict = source.verdict()?;
+    if counts.judged == 0 {
+        return Ok(source.nothing("the log has no frame of ours"));
+    }
+    show(&format!(
+        "{} frames keep every rule; {} foreign frames and {} error frames are not judged\n",
+        counts.judged, counts.foreign, counts.error_frames
+    ))?;
+    Ok(verdict)
+}
+
+pub fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
+    if let Some(bus) = &args.bus {
+        return play(args, bus);
+    }
+    finish_on_signal()?;
+    scenario::check_rate(args.rate)
+        .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
+    let model: RobotModel = load(args.model.as_ref())?;
+    let config = RigConfig {
+        nominal: ArmModel::from(&model),
+        actual: model,
+        period: Period::of_rate(args.rate),
+        start: [0.0; 4],
+        timing: args.bitrate,
+    };
+    let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
+    let mut replays: PerInterface<Replay> = BTreeMap::new();
+    let mut compared = 0;
+    while let Some(record) = source.record_of_interface() {
+        let interface = record.interface;
+        let replay = replays
+            .entry(interface)
+            .or_insert_with(|| Replay::new(config.controller()));
+        let before = replay.compared();
+        let same = replay.record(&record);
+        if source.counts(&record) {
+            compared += replay.compared() - before;
+            same.map_err(|difference| {
+                format!("{}: {difference}", place(&source, interface, &replays))
+            })?;
+        }
+    }
+    let verdict = source.verdict()?;
+    if compared == 0 {
+        return Ok(source.nothing("the log has no command of a controller"));
+    }
+    show(&format!(
+        "{compared} commands are the same, byte for byte\n"
+    ))?;
+    Ok(verdict)
+}
+
+fn play(args: &ReplayArgs, bus: &LinkAddress) -> Result<ExitCode, String> {
+    let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
+    let link = Link::open(bus).map_err(|error| error.to_string())?;
+    let mut player = Player::new(link, Pace::new(args.speed, args.skip_gaps));
+    let failed = |error: PlayError| format!("{bus}: {error}");
+    if let LinkAddress::Slcan(SlcanPeer::Listen(_)) = bus {
+        eprintln!("plant-sim: waiting for a client on {bus}");
+        player.wait_for_client().map_err(failed)?;
+    }
+    let begun = Instant::now();
+    let mut interfaces: Vec<Interface> = Vec::new();
+    while let Some(record) = source.record() {
+        if !interfaces.contains(&record.interface) {
+            interfaces.push(record.interface);
+            if let [first, second] = interfaces.as_slice() {
+                eprintln!(
+                    "plant-sim: frames of {first} and {second} go onto one bus; --interface chooses"
+                );
+            }
+        }
+        let wait = player.wait(record.time_us);
+        if wait > LONG {
+            eprintln!(
+                "plant-sim: {}: {:.3} s until the next frame; --skip-gaps leaves such waits out",
+                source.place(),
+                wait.as_secs_f64()
+            );
+        }
+        player
+            .record(&record)
+            .map_err(|error| format!("{}: {}", source.place(), failed(error)))?;
+    }
+    let played = player.finish().map_err(failed)?;
+    let verdict = source.verdict()?;
+    show(&format!(
+        "{} frames played onto {bus} in {:.3} s; {} had to wait for a place in the queue, {} error frames left out\n",
+        played.frames,
+        begun.elapsed().as_secs_f64(),
+        played.waited,
+        played.left_out,
+    ))?;
+    if played.lost > 0 {
+        return Err(format!(
+            "{bus}: {} frames were refused or not read at the other end",
+            played.lost
+        ));
+    }
+    Ok(verdict)
+}

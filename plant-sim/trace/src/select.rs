@@ -1,0 +1,160 @@
+//! Which records of a trace count: by identifier, interface and time.
+
+use std::str::FromStr;
+
+use protocol::frame::{ExtendedId, Id, StandardId};
+use protocol::table::TABLE;
+
+use super::{Entry, Interface, Record};
+
+/// Records that are asked for; without an answer to a question, all.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// Identifiers; with any, error frames do not count.
+    pub ids: Vec<Ids>,
+    /// Interfaces.
+    pub interfaces: Vec<Interface>,
+    /// Earliest time.
+    pub from: Option<Moment>,
+    /// Latest time.
+    pub to: Option<Moment>,
+}
+
+impl Selection {
+    /// Whether the record is of an interface that counts.
+    #[must_use]
+    pub fn interface(&self, record: &Record) -> bool {
+        self.interfaces.is_empty() || self.interfaces.contains(&record.interface)
+    }
+
+    /// Whether the record has an identifier that counts.
+    #[must_use]
+    pub fn id(&self, record: &Record) -> bool {
+        let of_frame = |ids: &Ids| match &record.entry {
+            Entry::Frame(frame) => ids.contain(frame.id()),
+            Entry::Error(_) => false,
+        };
+        self.ids.is_empty() || self.ids.iter().any(of_frame)
+    }
+
+    /// Whether the record, of a trace that begins at `first_us`, is in time.
+    #[must_use]
+    pub fn time(&self, record: &Record, first_us: u64) -> bool {
+        let at = |moment: Moment| moment.time_us(first_us);
+        self.from.is_none_or(|from| at(from) <= record.time_us)
+            && self.to.is_none_or(|to| record.time_us <= at(to))
+    }
+}
+
+/// Identifiers of one kind from one to another: `1C0`, `300-3FF`, `18FF0000-18FFFFFF`, or a message by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ids {
+    first: Id,
+    last: Id,
+}
+
+impl Ids {
+    /// Identifiers order as in arbitration, where both kinds mix: the kind is compared apart.
+    fn contain(self, id: Id) -> bool {
+        is_extended(id) == is_extended(self.first) && self.first <= id && id <= self.last
+    }
+}
+
+fn is_extended(id: Id) -> bool {
+    matches!(id, Id::Extended(_))
+}
+
+impl FromStr for Ids {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(info) = TABLE
+            .iter()
+            .find(|info| info.name.eq_ignore_ascii_case(text))
+        {
+            let id = StandardId::new(info.id)
+                .map(Id::Standard)
+                .ok_or("no such identifier")?;
+            return Ok(Self {
+                first: id,
+                last: id,
+            });
+        }
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        let ids = Self {
+            first: id(first)?,
+            last: id(last)?,
+        };
+        if is_extended(ids.first) != is_extended(ids.last) {
+            return Err("one end of the range has 11 bits, the other 29".into());
+        }
+        if ids.first > ids.last {
+            return Err("the range ends before it begins".into());
+        }
+        Ok(ids)
+    }
+}
+
+fn id(text: &str) -> Result<Id, String> {
+    let digits = text.strip_prefix("0x").unwrap_or(text);
+    let id = u32::from_str_radix(digits, 16).ok().and_then(|raw| {
+        if digits.len() == 8 {
+            ExtendedId::new(raw).map(Id::Extended)
+        } else {
+            let raw = u16::try_from(raw).ok().filter(|_| digits.len() <= 3)?;
+            StandardId::new(raw).map(Id::Standard)
+        }
+    });
+    id.ok_or_else(|| {
+        "allowed: up to 3 hexadecimal digits (11 bits, to 7FF) or 8 (29 bits, to 1FFFFFFF), a range of them (300-3FF), \
+         or the name of a message"
+            .into()
+    })
+}
+
+/// A time: seconds as the trace has them, or after its first record with `+` in front.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// As the trace has it, us.
+    Absolute(u64),
+    /// From the first record on, us.
+    Relative(u64),
+}
+
+impl Moment {
+    fn time_us(self, first_us: u64) -> u64 {
+        match self {
+            Self::Absolute(time_us) => time_us,
+            Self::Relative(time_us) => first_us.saturating_add(time_us),
+        }
+    }
+}
+
+impl FromStr for Moment {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (digits, relative) = match text.strip_prefix('+') {
+            Some(digits) => (digits, true),
+            None => (text, false),
+        };
+        let time_us = microseconds(digits).ok_or(
+            "allowed: seconds as the trace has them (12.5), or after its first record (+12.5)",
+        )?;
+        Ok(if relative {
+            Self::Relative(time_us)
+        } else {
+            Self::Absolute(time_us)
+        })
+    }
+}
+
+/// Microseconds of seconds with or without decimals, exactly: a double has too few digits for the time since 1970.
+fn microseconds(text: &str) -> Option<u64> {
+    let with_point = if text.contains('.') {
+        text.to_owned()
+    } else {
+        format!("{text}.0")
+    };
+    super::line::timestamp(with_point.as_bytes()).ok()
+}
