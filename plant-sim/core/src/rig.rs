@@ -27,6 +27,8 @@ const MAILBOXES: usize = 32;
 
 /// Longest time that a run goes on after its operator has given up, for the arm to come to rest.
 pub const STANDSTILL_LIMIT: Duration = Duration::from_secs(5);
+/// Time for which the arm has to stand still.
+const REST: Duration = Duration::from_millis(20);
 /// Joint speed below which an axis stands, rad/s and m/s.
 const STANDING: f64 = 1e-3;
 
@@ -182,8 +184,14 @@ impl<'p> Rig<'p> {
         };
         if outcome.is_err() {
             let limit = self.now() + STANDSTILL_LIMIT;
-            while !self.is_at_rest() && self.now() < limit {
+            let mut resting = Duration::ZERO;
+            while resting < REST && self.now() < limit {
                 self.step(pace, observer)?;
+                resting = if self.is_at_rest() {
+                    resting + self.period.duration()
+                } else {
+                    Duration::ZERO
+                };
             }
         }
         outcome.map_err(RunError::from)

@@ -212,12 +212,12 @@ impl Observer for Collector {
                 self.faults.push(fault);
                 self.awaits_state = true;
             }
-            // What had no room in the emergency follows at once.
+            // What had no room in the emergency follows at once, unless a state of before is still under way.
             Message::State(state) => {
-                self.awaits_state = false;
                 if let Some(last) = self.faults.last_mut()
                     && last.cause == state.cause.name()
                 {
+                    self.awaits_state = false;
                     last.describe(&state.fault());
                 }
             }

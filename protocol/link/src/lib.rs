@@ -3,7 +3,7 @@
 //! A [`Link`] is a [`Bus`] that can also be waited for. A person names one as text, a [`LinkAddress`]. The crate leans on
 //! [`protocol`] alone; what frames mean is not its business. A Feedback frame that arrives on vcan0 is read by
 //! [`SocketCan`], stamped by the kernel ([`Stamped`]), and taken by the controller's process through [`Bus::receive`];
-//! the Command goes out through [`Bus::transmit`]. The programs that need a thread of real-time priority or a sleep until
+//! the Command goes out through [`Transmit::transmit`]. The programs that need a thread of real-time priority or a sleep until
 //! an instant find them in [`realtime`].
 
 #![forbid(unsafe_code)]
@@ -86,7 +86,7 @@ impl Link {
         }
     }
 
-    /// Bytes of frames taken by [`transmit`](Bus::transmit) that this process still holds; what is left when the link is
+    /// Bytes of frames taken by [`transmit`](Transmit::transmit) that this process still holds; what is left when the link is
     /// dropped is never sent. They go out while the link is waited for.
     #[must_use]
     pub fn unsent(&self) -> usize {
