@@ -33,7 +33,7 @@ use source::Source;
 
 /// Subcommands of `trace`.
 #[derive(Subcommand)]
-pub enum TraceCommand {
+pub(super) enum TraceCommand {
     /// Name every field of every frame, with its unit.
     Decode(DecodeArgs),
     /// Rates, periods, jitter, losses and bus load, by identifier.
@@ -50,7 +50,7 @@ pub enum TraceCommand {
 
 /// Arguments of `decode`.
 #[derive(Args)]
-pub struct DecodeArgs {
+pub(super) struct DecodeArgs {
     /// candump log, or - for standard input.
     file: PathBuf,
     /// How it is written.
@@ -73,7 +73,7 @@ enum FormatChoice {
 
 /// Arguments of `stats`.
 #[derive(Args)]
-pub struct StatsArgs {
+pub(super) struct StatsArgs {
     /// candump log, or - for standard input.
     file: PathBuf,
     /// Print JSON instead of a table.
@@ -83,7 +83,7 @@ pub struct StatsArgs {
 
 /// Arguments of `plot`.
 #[derive(Args)]
-pub struct PlotArgs {
+pub(super) struct PlotArgs {
     /// candump log, or - for standard input.
     file: PathBuf,
     /// The robot (a model file); turns encoder counts into joint positions.
@@ -96,7 +96,7 @@ pub struct PlotArgs {
 
 /// Arguments of `check`.
 #[derive(Args)]
-pub struct CheckArgs {
+pub(super) struct CheckArgs {
     /// candump log, or - for standard input.
     file: PathBuf,
     /// The robot (a model file); its motors limit the torque.
@@ -106,7 +106,7 @@ pub struct CheckArgs {
 
 /// Arguments of `replay`.
 #[derive(Args)]
-pub struct ReplayArgs {
+pub(super) struct ReplayArgs {
     /// candump log, or - for standard input. For the controller it must begin before its first sample.
     file: PathBuf,
     /// The robot that the recorded controller believed in (a model file).
@@ -139,7 +139,7 @@ fn speed(text: &str) -> Result<f64, String> {
 
 /// Arguments of `convert`.
 #[derive(Args)]
-pub struct ConvertArgs {
+pub(super) struct ConvertArgs {
     /// candump log, or - for standard input.
     file: PathBuf,
     /// What it becomes.
@@ -161,7 +161,7 @@ enum TargetChoice {
 }
 
 /// Does what the subcommand says.
-pub fn run(command: &TraceCommand) -> Result<ExitCode, String> {
+pub(super) fn run(command: &TraceCommand) -> Result<ExitCode, String> {
     match command {
         TraceCommand::Decode(args) => decode(args),
         TraceCommand::Stats(args) => stats(args),

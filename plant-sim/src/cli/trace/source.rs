@@ -16,7 +16,7 @@ const SHOWN: u64 = 10;
 const LOOK: u64 = 1 << 14;
 
 /// A trace that is read from front to end, with its progress on standard error.
-pub struct Source {
+pub(super) struct Source {
     name: String,
     reader: Reader<BufReader<Counted>>,
     /// Bytes read, and bytes there are if that is known.
@@ -42,7 +42,7 @@ impl Read for Counted {
 }
 
 impl Source {
-    pub fn open(path: &Path) -> Result<Self, String> {
+    pub(super) fn open(path: &Path) -> Result<Self, String> {
         let mut name = path.display().to_string();
         let (input, size): (Box<dyn Read>, _) = if path == Path::new("-") {
             name = "standard input".into();
@@ -69,7 +69,7 @@ impl Source {
     }
 
     /// The next line as it is; `Err` if the file cannot be read.
-    pub fn line(&mut self) -> Result<Option<Result<Record, Problem>>, String> {
+    pub(super) fn line(&mut self) -> Result<Option<Result<Record, Problem>>, String> {
         self.progress();
         match self.reader.next() {
             None => Ok(None),
@@ -83,7 +83,7 @@ impl Source {
     }
 
     /// The next record; lines that cannot be read are named on standard error and left out.
-    pub fn record(&mut self) -> Result<Option<Record>, String> {
+    pub(super) fn record(&mut self) -> Result<Option<Record>, String> {
         loop {
             match self.line()? {
                 None => return Ok(None),
@@ -99,12 +99,12 @@ impl Source {
     }
 
     /// File and line read last.
-    pub fn place(&self) -> String {
+    pub(super) fn place(&self) -> String {
         format!("{}:{}", self.name, self.reader.line())
     }
 
     /// Success only if every line could be read.
-    pub fn verdict(&self) -> Result<ExitCode, String> {
+    pub(super) fn verdict(&self) -> Result<ExitCode, String> {
         match self.unreadable {
             0 => Ok(ExitCode::SUCCESS),
             lines => Err(format!(

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use protocol::frame::{CanFrame, FrameKind};
+use time::{Duration, UtcDateTime};
 
 use super::Interfaces;
 use crate::decode::Seconds;
@@ -15,14 +16,14 @@ const FLAG_BRS: u32 = 1 << 13;
 const FLAG_ESI: u32 = 1 << 14;
 
 /// An ASC file.
-pub struct Asc<W> {
+pub(super) struct Asc<W> {
     sink: W,
     interfaces: Interfaces,
     start_us: Option<u64>,
 }
 
 impl<W: Write> Asc<W> {
-    pub fn new(sink: W) -> Self {
+    pub(super) fn new(sink: W) -> Self {
         Self {
             sink,
             interfaces: Interfaces::default(),
@@ -30,7 +31,7 @@ impl<W: Write> Asc<W> {
         }
     }
 
-    pub fn record(&mut self, record: &Record) -> io::Result<()> {
+    pub(super) fn record(&mut self, record: &Record) -> io::Result<()> {
         let start_us = match self.start_us {
             Some(start_us) => start_us,
             None => {
@@ -49,7 +50,7 @@ impl<W: Write> Asc<W> {
         writeln!(self.sink, "{time:>11} {content}")
     }
 
-    pub fn finish(mut self) -> io::Result<W> {
+    pub(super) fn finish(mut self) -> io::Result<W> {
         if self.start_us.is_none() {
             self.header(0)?;
         }
@@ -104,29 +105,18 @@ fn frame_line(channel: usize, frame: &CanFrame) -> String {
 
 /// UTC date of a time since 1970: `Thu Jan 01 00:00:00.000 1970`.
 fn date(time_us: u64) -> String {
-    const WEEKDAYS: [&str; 7] = ["Thu", "Fri", "Sat", "Sun", "Mon", "Tue", "Wed"];
-    const MONTHS: [&str; 12] = [
-        "Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec",
-    ];
-    let milliseconds = time_us / 1000;
-    let (days, of_day) = (milliseconds / 86_400_000, milliseconds % 86_400_000);
-    // Years of 400-year cycles that begin in March, so that the leap day is the last of a year.
-    let since_march = days + 719_468;
-    let (cycle, day) = (since_march / 146_097, since_march % 146_097);
-    let year_of_cycle = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day_of_year = day - (365 * year_of_cycle + year_of_cycle / 4 - year_of_cycle / 100);
-    let month_from_march = (5 * day_of_year + 2) / 153;
-    let day_of_month = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = (month_from_march + 2) % 12;
-    let year = 400 * cycle + year_of_cycle + u64::from(month < 2);
+    // A log's time may be anything; the calendar ends with the year 9999.
+    let since = Duration::microseconds(i64::try_from(time_us).unwrap_or(i64::MAX));
+    let date = UtcDateTime::UNIX_EPOCH.saturating_add(since);
+    let (weekday, month) = (date.weekday().to_string(), date.month().to_string());
     format!(
-        "{} {} {day_of_month:02} {:02}:{:02}:{:02}.{:03} {year}",
-        WEEKDAYS[(days % 7) as usize],
-        MONTHS[month as usize],
-        of_day / 3_600_000,
-        of_day / 60_000 % 60,
-        of_day / 1000 % 60,
-        of_day % 1000
+        "{weekday:.3} {month:.3} {:02} {:02}:{:02}:{:02}.{:03} {}",
+        date.day(),
+        date.hour(),
+        date.minute(),
+        date.second(),
+        date.millisecond(),
+        date.year()
     )
 }
 
@@ -147,6 +137,7 @@ mod tests {
         ] {
             assert_eq!(date(seconds * 1_000_000), expected);
         }
+        assert!(date(u64::MAX).ends_with(" 9999"));
         assert_eq!(date(1_436_509_052_249_713), "Fri Jul 10 06:17:32.249 2015");
     }
 }
