@@ -27,11 +27,11 @@ use profile::{SCurve, Sample};
 pub struct Reference {
     /// Joint positions: rad, rad, m, rad.
     pub q: Vector4<f32>,
-    /// Joint velocities.
+    /// Joint velocities: rad/s, rad/s, m/s, rad/s.
     pub qd: Vector4<f32>,
-    /// Joint accelerations.
+    /// Joint accelerations: rad/s^2, rad/s^2, m/s^2, rad/s^2.
     pub qdd: Vector4<f32>,
-    /// Joint jerks.
+    /// Joint jerks: rad/s^3, rad/s^3, m/s^3, rad/s^3.
     pub qddd: Vector4<f32>,
 }
 

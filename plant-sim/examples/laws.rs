@@ -1,4 +1,6 @@
 //! The table of docs/motion.md: every control law on the gate, with the right and a wrong model.
+//!
+//! Arguments are control rates in Hz; without one it is 1000.
 
 use sim::run::in_process;
 use sim::scenario::Scenario;
@@ -18,11 +20,18 @@ const LAWS: [&str; 10] = [
 ];
 
 fn main() {
+    let mut rates: Vec<f64> = std::env::args()
+        .skip(1)
+        .map(|rate| rate.parse().expect("a rate in Hz"))
+        .collect();
+    if rates.is_empty() {
+        rates.push(1000.0);
+    }
     println!(
         "| law | model | rate Hz | cycle s | error max mm | error rms mm | settling ms | final error mm |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    for rate in [1000.0, 2000.0] {
+    for rate in rates {
         for name in ["gate", "gate-mismatch"] {
             for law in LAWS {
                 row(name, law, rate);

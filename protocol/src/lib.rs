@@ -1,8 +1,30 @@
 //! What is on the wire between the drive cabinet's controller, its drives and the operator, and nothing else.
 //!
-//! A frame comes from a [`Bus`](bus::Bus) that never blocks; the [`codec`] makes a message of it or says what is wrong
-//! with it; a [`Receiver`](e2e::Receiver) judges its place in the sequence. The way back is [`codec::encode`]. What
-//! identifiers and bytes mean stands in one [`table`].
+//! # What lives here
+//!
+//! ```text
+//! codec ----> table ----> hash          one table describes every message; codec, hash and DBC follow it
+//!   |           |
+//!   v           v
+//! messages    schema, signals           the same messages as Rust types, and as offsets, ranges and units
+//!   |
+//!   v
+//! codes                                 enumerations on the wire
+//!
+//! e2e, counters                         place of a frame in its sequence; what was received and refused, by cause
+//! frame, bus                            a CAN frame, and a controller that sends and receives without blocking
+//! wire, slcan                           bits and times of a frame; frames as lines of text
+//! ```
+//!
+//! # The way of one Feedback frame
+//!
+//! The drives call [`codec::encode`]: fields of [`Feedback`](messages::Feedback) to bytes, counter and CRC behind them.
+//! The receiver takes the [`CanFrame`](frame::CanFrame) from its [`Bus`](bus::Bus) and calls [`codec::decode`], which
+//! finds the message in the [`table`] and checks length, CRC, canonical form and ranges, in this order; then
+//! [`Receiver`](e2e::Receiver) judges the counter. Only what passes both is used; the rest is counted in
+//! [`Counters`](counters::Counters) by cause and changes nothing.
+//!
+//! Nothing here allocates, panics or reads a clock, and nothing knows a robot.
 
 #![no_std]
 #![forbid(unsafe_code)]

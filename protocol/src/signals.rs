@@ -75,19 +75,19 @@ const fn when(
 }
 
 /// Network management.
-pub const NMT: &[Signal] = &[
+pub(crate) const NMT: &[Signal] = &[
     signal("command", 0, Kind::Code(NmtCommand::CODES), one!("")),
     signal("node", 1, Kind::U8, one!("")),
 ];
 
 /// Emergency stop.
-pub const ESTOP: &[Signal] = &[
+pub(crate) const ESTOP: &[Signal] = &[
     signal("reason", 0, Kind::U8, one!("")),
     signal("counter", 1, Kind::U8, one!("")),
 ];
 
 /// Emergency.
-pub const EMERGENCY: &[Signal] = &[
+pub(crate) const EMERGENCY: &[Signal] = &[
     signal("code", 0, Kind::U16, one!("")),
     signal("register", 2, Kind::U8, one!("")),
     signal("cause", 3, CAUSE, one!("")),
@@ -95,7 +95,7 @@ pub const EMERGENCY: &[Signal] = &[
 ];
 
 /// Feedback of the drives.
-pub const FEEDBACK: &[Signal] = &[
+pub(crate) const FEEDBACK: &[Signal] = &[
     signal("sample", 0, Kind::U32, one!("")),
     signal("status", 4, Kind::Flags8(DriveStatus::NAMES), one!("")),
     signal("position", 5, Kind::I32, motors!("count")),
@@ -105,7 +105,7 @@ pub const FEEDBACK: &[Signal] = &[
 ];
 
 /// Command to the drives.
-pub const COMMAND: &[Signal] = &[
+pub(crate) const COMMAND: &[Signal] = &[
     signal("sample", 0, Kind::U32, one!("")),
     signal("control", 4, Kind::Flags8(ControlWord::NAMES), one!("")),
     // About twice the peak torque of the largest motor.
@@ -113,7 +113,7 @@ pub const COMMAND: &[Signal] = &[
 ];
 
 /// Request of the operator.
-pub const MOTION: &[Signal] = &[
+pub(crate) const MOTION: &[Signal] = &[
     signal("sequence", 0, Kind::U8, one!("")),
     signal("request", 1, Kind::Selector(MotionRequest::NAMES), one!("")),
     when(4, "joint_target", 2, COORDINATE, JOINTS),
@@ -153,7 +153,7 @@ pub const MOTION: &[Signal] = &[
 ];
 
 /// Report of the controller.
-pub const STATE: &[Signal] = &[
+pub(crate) const STATE: &[Signal] = &[
     signal("mode", 0, MODE, one!("")),
     signal("cause", 1, CAUSE, one!("")),
     signal("limits", 2, Kind::Flags16(LimitFlags::NAMES), one!("")),
@@ -177,7 +177,7 @@ pub const STATE: &[Signal] = &[
 ];
 
 /// Answer to a request.
-pub const MOTION_REPLY: &[Signal] = &[
+pub(crate) const MOTION_REPLY: &[Signal] = &[
     signal("sequence", 0, Kind::U8, one!("")),
     signal("outcome", 1, Kind::Selector(Outcome::NAMES), one!("")),
     when(1, "reason", 2, Kind::Code(RefusalReason::CODES), one!("")),
@@ -187,7 +187,7 @@ pub const MOTION_REPLY: &[Signal] = &[
 ];
 
 /// Answer of a parameter server.
-pub const PARAMETER_REPLY: &[Signal] = &[
+pub(crate) const PARAMETER_REPLY: &[Signal] = &[
     signal("reply", 0, Kind::Selector(ParameterReply::NAMES), one!("")),
     when(0, "value_index", 1, Kind::U16, one!("")),
     when(0, "value", 3, ANY, one!("")),
@@ -202,7 +202,7 @@ pub const PARAMETER_REPLY: &[Signal] = &[
 ];
 
 /// Request to a parameter server.
-pub const PARAMETER_REQUEST: &[Signal] = &[
+pub(crate) const PARAMETER_REQUEST: &[Signal] = &[
     signal(
         "request",
         0,
@@ -219,7 +219,7 @@ pub const PARAMETER_REQUEST: &[Signal] = &[
 ];
 
 /// Heartbeat.
-pub const HEARTBEAT: &[Signal] = &[
+pub(crate) const HEARTBEAT: &[Signal] = &[
     signal("state", 0, MODE, one!("")),
     signal("cause", 1, CAUSE, one!("")),
     signal("reset", 2, Kind::Code(ResetReason::CODES), one!("")),

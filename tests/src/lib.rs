@@ -1,5 +1,9 @@
 //! Shared ground of the tests that cross crates: the reference tables.
 //!
+//! The tests are in `tests/tests`: `agreement_*` hold controller and plant against the tables, `closed_loop` judges whole
+//! runs, so that a Feedback frame is followed from encoder to torque, `errata` the paper, `eval` the command line, `walls`
+//! the architecture. The program `docs` keeps the documents true.
+//!
 //! The tables under `tests/reference` come from engines that share no code with this workspace (Pinocchio, MuJoCo).
 //! All quantities are SI; vectors and matrices are spread over numbered columns: `q1..q4`, `M11..M44`.
 //!

@@ -17,7 +17,7 @@ const TOLERANCE: f32 = 2e-6;
 ///
 /// # Errors
 /// The first known answer that is wrong.
-pub fn run(arm: &ArmModel) -> Result<(), KnownAnswer> {
+pub(crate) fn run(arm: &ArmModel) -> Result<(), KnownAnswer> {
     let failed = |right, answer| if right { Ok(()) } else { Err(answer) };
     failed(sine(), KnownAnswer::Sine)?;
     failed(kinematics(), KnownAnswer::Kinematics)?;

@@ -89,7 +89,8 @@ pub struct JointLimits {
     pub jerk: Vector4<f32>,
     /// Greatest effort (N m, lift N).
     pub effort: Vector4<f32>,
-    /// Effort that can be held for ever (N m, lift N), as a root mean square.
+    /// Continuous effort (N m, lift N), as a root mean square. Checked and stored only: it waits for a thermal model of the
+    /// motors; until then no law or plan looks at it.
     pub effort_continuous: Vector4<f32>,
 }
 

@@ -53,7 +53,7 @@ impl Body {
         }
     }
 
-    /// [`Body::mass_matrix`] times `qdd`, in less than making the matrix takes.
+    /// [`Body::mass_matrix`] times `qdd`, cheaper than building the matrix.
     pub fn inertial(&self, trig: &Trig, qdd: &Vector4<f32>) -> Vector4<f32> {
         let mut torque = self.lagrange.inertial(trig, qdd);
         torque.x += self.rotor.m11 * qdd.x;
@@ -72,17 +72,26 @@ impl Body {
     }
 }
 
-/// The inertia matrix of a SCARA, symmetric and half empty: links couple the three turning axes, rotors lift and wrist.
+/// The inertia matrix of a SCARA at the joints, symmetric and half empty: links couple the three turning axes, rotors lift
+/// and wrist. `mij` is the effort of axis i for a unit acceleration of axis j: kg m^2 among turning axes, kg for the lift,
+/// kg m between the two.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct MassMatrix {
+    /// Shoulder, kg m^2.
     pub m11: f32,
+    /// Shoulder and elbow, kg m^2.
     pub m12: f32,
+    /// Shoulder and wrist, kg m^2.
     pub m14: f32,
+    /// Elbow, kg m^2.
     pub m22: f32,
+    /// Elbow and wrist, kg m^2.
     pub m24: f32,
+    /// Lift, kg.
     pub m33: f32,
+    /// Lift and wrist, by the ball-screw spline, kg m.
     pub m34: f32,
+    /// Wrist, kg m^2.
     pub m44: f32,
 }
 

@@ -111,6 +111,8 @@ impl Jacobian {
 
     /// Singular values of the planar block, the greater first (m): the greatest and the least horizontal speed of
     /// the flange for speeds of shoulder and elbow on the unit circle.
+    ///
+    /// Paper function; not on the control path.
     #[must_use]
     pub fn singular_values(&self) -> (f32, f32) {
         let product = self.determinant.abs();
@@ -132,6 +134,8 @@ impl Jacobian {
     }
 
     /// Time derivative of the task Jacobian at joint speeds `qd`.
+    ///
+    /// Paper function; not on the control path.
     #[must_use]
     pub fn rate(&self, qd: &Vector4<f32>) -> Matrix4<f32> {
         let Self { x1, x2, y1, y2, .. } = *self;
@@ -177,6 +181,8 @@ impl Jacobian {
     }
 
     /// The inverse of the task Jacobian; `None` where [`Jacobian::joint_speed`] has none.
+    ///
+    /// Paper function; not on the control path.
     #[must_use]
     pub fn inverse(&self) -> Option<Matrix4<f32>> {
         let unit = [Vector4::x(), Vector4::y(), Vector4::z(), Vector4::w()];

@@ -4,6 +4,8 @@
 //! Denavit-Hartenberg frames. The arm's table is the standard one, where joint i + 1 turns about z of frame i. With the
 //! half turn between frames 1 and 2 the difference flips signs (eq. 34 to 39 as printed), so the joint rate enters here
 //! before the vector is carried into the new frame.
+//!
+//! Paper functions; not on the control path, which takes tool velocities from the Jacobian.
 
 use nalgebra::{Vector3, Vector4};
 

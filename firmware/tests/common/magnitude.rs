@@ -21,10 +21,10 @@ use firmware::mechanics::arm::{ArmModel, Payload};
 use nalgebra::{Matrix4, Vector4};
 
 /// Roundings of the recursive Newton-Euler algorithm.
-pub const NEWTON_EULER: f64 = 106.0;
+pub(crate) const NEWTON_EULER: f64 = 106.0;
 
 /// Roundings of Lagrange's closed form.
-pub const LAGRANGE: f64 = 46.0;
+pub(crate) const LAGRANGE: f64 = 46.0;
 
 struct Body {
     mass: f64,
@@ -34,7 +34,7 @@ struct Body {
 }
 
 /// Sum of the magnitudes of all terms of the joint efforts.
-pub fn effort(
+pub(crate) fn effort(
     arm: &ArmModel,
     payload: &Payload,
     gravity: f32,
@@ -98,7 +98,7 @@ pub fn effort(
 }
 
 /// The same for the mass matrix: column by column for unit accelerations.
-pub fn mass_matrix(arm: &ArmModel, payload: &Payload) -> Matrix4<f64> {
+pub(crate) fn mass_matrix(arm: &ArmModel, payload: &Payload) -> Matrix4<f64> {
     let mut mass = Matrix4::zeros();
     for joint in 0..4 {
         let mut unit = Vector4::zeros();

@@ -1,17 +1,17 @@
 //! Shared by the tests of the mathematics: random arms and positions, and what they measure errors in.
 #![allow(dead_code)] // Each test binary uses its own part.
 
-pub mod magnitude;
+pub(crate) mod magnitude;
 
 use firmware::mechanics::arm::{ArmModel, Geometry, IRB_930, Link, Payload};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 
 /// Unit roundoff of f32, as the doc comments use it.
-pub const U: f64 = 1.0 / (1u32 << 24) as f64;
+pub(crate) const U: f64 = 1.0 / (1u32 << 24) as f64;
 
 /// The short sister of the IRB 930: 12 kg at 0.85 m.
-pub fn irb_930_short() -> ArmModel {
+pub(crate) fn irb_930_short() -> ArmModel {
     let mut arm = IRB_930;
     arm.geometry.a1 = 0.36;
     arm.links[0] = Link {
@@ -24,7 +24,7 @@ pub fn irb_930_short() -> ArmModel {
 }
 
 /// A joint position inside the limits of the IRB 930.
-pub fn position() -> impl Strategy<Value = Vector4<f32>> {
+pub(crate) fn position() -> impl Strategy<Value = Vector4<f32>> {
     let (lower, upper) = (IRB_930.limits.lower, IRB_930.limits.upper);
     (
         lower.x..=upper.x,
@@ -36,19 +36,19 @@ pub fn position() -> impl Strategy<Value = Vector4<f32>> {
 }
 
 /// A joint vector within plus or minus `bound`.
-pub fn within(bound: Vector4<f32>) -> impl Strategy<Value = Vector4<f32>> {
+pub(crate) fn within(bound: Vector4<f32>) -> impl Strategy<Value = Vector4<f32>> {
     let unit = -1.0..=1.0f32;
     (unit.clone(), unit.clone(), unit.clone(), unit)
         .prop_map(move |(a, b, c, d)| Vector4::new(a, b, c, d).component_mul(&bound))
 }
 
 /// Joint speeds up to the limits of the IRB 930.
-pub fn speed() -> impl Strategy<Value = Vector4<f32>> {
+pub(crate) fn speed() -> impl Strategy<Value = Vector4<f32>> {
     within(IRB_930.limits.velocity)
 }
 
 /// Joint accelerations up to the limits of the IRB 930.
-pub fn acceleration() -> impl Strategy<Value = Vector4<f32>> {
+pub(crate) fn acceleration() -> impl Strategy<Value = Vector4<f32>> {
     within(IRB_930.limits.acceleration)
 }
 
@@ -71,7 +71,7 @@ fn link() -> impl Strategy<Value = Link> {
 }
 
 /// A body at the flange with its centre of mass anywhere, or none.
-pub fn payload() -> impl Strategy<Value = Payload> {
+pub(crate) fn payload() -> impl Strategy<Value = Payload> {
     let held = (0.0..=22.0f32, offset(), inertia()).prop_map(|(mass, com, inertia)| Payload {
         mass,
         com,
@@ -81,7 +81,7 @@ pub fn payload() -> impl Strategy<Value = Payload> {
 }
 
 /// An arm with links of any length, centres of mass off their axes and heights off the plane; or one of the two real ones.
-pub fn arm() -> impl Strategy<Value = ArmModel> {
+pub(crate) fn arm() -> impl Strategy<Value = ArmModel> {
     let lengths = (0.05..=1.2f32, 0.05..=1.2f32, -0.5..=0.5f32, -0.5..=0.5f32);
     let links = [link(), link(), link(), link()];
     let random =
@@ -96,7 +96,7 @@ pub fn arm() -> impl Strategy<Value = ArmModel> {
 
 /// Asserts `|actual - expected| <= bound` for each joint.
 #[track_caller]
-pub fn assert_close(
+pub(crate) fn assert_close(
     what: &str,
     actual: &Vector4<f32>,
     expected: &Vector4<f64>,

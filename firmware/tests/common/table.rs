@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// Compares the part called `name`, between its two marks, with `text`. With `UPDATE_DOCS` set it is written instead.
 #[track_caller]
-pub fn compare(name: &str, text: &str) {
+pub(crate) fn compare(name: &str, text: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/safety.md");
     let doc = std::fs::read_to_string(&path).expect("docs/safety.md can be read");
     let (begin, end) = (

@@ -23,7 +23,7 @@ fn emergencies(sent: &[Message]) -> Vec<Emergency> {
         .collect()
 }
 
-pub fn states(sent: &[Message]) -> Vec<State> {
+pub(crate) fn states(sent: &[Message]) -> Vec<State> {
     sent.iter()
         .filter_map(|message| match message {
             Message::State(state) => Some(*state),

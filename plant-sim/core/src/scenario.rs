@@ -175,12 +175,12 @@ pub enum Step {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Jump {
-    /// x, y, z, yaw.
+    /// Flange at the end: x, y, z (m) and yaw (rad) in frame 0.
     #[serde(deserialize_with = "exactly")]
     pub to: [f64; 4],
-    /// Height of the tool at the top.
+    /// z of the flange on its way across, m in frame 0: a height of the cell, not above start or end.
     pub top: f64,
-    /// Vertical part at both ends.
+    /// Length of the strictly vertical part at each end, m upwards from where the flange is there.
     pub clearance: f64,
     /// Share of full speed.
     #[serde(default = "full")]
@@ -191,7 +191,7 @@ pub struct Jump {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
-    /// x, y, z, yaw or the four joint positions.
+    /// Flange x, y, z (m) and yaw (rad) in frame 0, or the four joint positions (rad, rad, m, rad).
     #[serde(deserialize_with = "exactly")]
     pub to: [f64; 4],
     /// Share of full speed.

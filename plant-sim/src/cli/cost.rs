@@ -20,7 +20,7 @@ use super::show;
 
 /// Arguments of `cost`.
 #[derive(Args)]
-pub struct CostArgs {
+pub(super) struct CostArgs {
     /// What to run: gate, gate-mismatch, square, pick-place, or a scenario file.
     #[arg(long, value_name = "NAME|FILE", default_value = "gate")]
     scenario: String,
@@ -44,7 +44,7 @@ pub struct CostArgs {
 
 /// Runs two cycles with either image and shows instructions by kind of call and by phase: the second cycle is planned
 /// while the first is still running. The count is that of the emulator, the same in every run.
-pub fn run(args: &CostArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &CostArgs) -> Result<ExitCode, String> {
     let whole = measure(args, args.image.as_ref(), IMAGE)?;
     let parts = measure(args, args.cost_image.as_ref(), COST_IMAGE)?;
     let report = Report::new(&whole, &parts);

@@ -14,7 +14,7 @@ use super::show;
 
 /// Arguments of `crash`.
 #[derive(Args)]
-pub struct CrashArgs {
+pub(super) struct CrashArgs {
     /// The image, instead of the one built from the sources; it has to be one that plants faults.
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
@@ -22,7 +22,7 @@ pub struct CrashArgs {
 
 /// Plants one fault after the other into a moving arm. Fails if one of them does not end in the
 /// safe state.
-pub fn run(args: &CrashArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &CrashArgs) -> Result<ExitCode, String> {
     let image = match &args.image {
         Some(image) => image.clone(),
         None => qemu::build(qemu::FAULTS_IMAGE).map_err(|error| error.to_string())?,

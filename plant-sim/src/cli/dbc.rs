@@ -11,14 +11,14 @@ use super::show;
 
 /// Arguments of `dbc`.
 #[derive(Args)]
-pub struct DbcArgs {
+pub(super) struct DbcArgs {
     /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
 /// Writes the DBC file.
-pub fn run(args: &DbcArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &DbcArgs) -> Result<ExitCode, String> {
     let text = dbc::generate();
     match &args.out {
         Some(path) => output::write(path, &text).map_err(|error| error.to_string())?,

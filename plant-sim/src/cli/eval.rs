@@ -12,7 +12,7 @@ use super::{run, show};
 
 /// Arguments of `eval`.
 #[derive(Args)]
-pub struct EvalArgs {
+pub(super) struct EvalArgs {
     /// What to compute.
     #[arg(value_enum)]
     table: Table,
@@ -28,7 +28,7 @@ pub struct EvalArgs {
 }
 
 /// Reads rows from standard input and writes results to standard output; after an error, nothing.
-pub fn run(args: &EvalArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &EvalArgs) -> Result<ExitCode, String> {
     let model = run::load(args.model.as_ref())?;
     let payload = match &args.payload {
         None => None,

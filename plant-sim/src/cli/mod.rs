@@ -18,7 +18,7 @@ use clap::{Parser, Subcommand};
 /// Development bench for a SCARA drive cabinet: the controller that goes into the cabinet against
 /// a simulated IRB 930, over CAN.
 #[derive(Parser)]
-#[command(name = "plant-sim", version, args_conflicts_with_subcommands = true)]
+#[command(name = "plant-sim", version = env!("VERSION_AND_COMMIT"), args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -50,7 +50,7 @@ enum Command {
 }
 
 /// Does what the command line says. An error is one message for the person who typed it.
-pub fn main() -> Result<ExitCode, String> {
+pub(crate) fn main() -> Result<ExitCode, String> {
     let cli = Cli::parse();
     match cli.command {
         None => run::run(&cli.run),

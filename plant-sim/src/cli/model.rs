@@ -16,7 +16,7 @@ use super::show;
 
 /// Arguments of `model`.
 #[derive(Args)]
-pub struct ModelArgs {
+pub(super) struct ModelArgs {
     /// The robot (a model file); otherwise the built-in IRB 930-22/1.05.
     file: Option<PathBuf>,
     /// Write to this file instead of standard output.
@@ -25,7 +25,7 @@ pub struct ModelArgs {
 }
 
 /// Writes the robot as JSON.
-pub fn run(args: &ModelArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &ModelArgs) -> Result<ExitCode, String> {
     let arm = ArmModel::from(&load(args.file.as_ref())?);
     arm.validate()
         .map_err(|error| format!("the controller cannot work with this robot: {error}"))?;

@@ -20,14 +20,14 @@ const BATCH: usize = 1024;
 
 /// Arguments of `monitor`.
 #[derive(Args)]
-pub struct MonitorArgs {
+pub(super) struct MonitorArgs {
     /// The bus: socketcan:INTERFACE, slcan:TERMINAL, slcan:tcp:HOST:PORT or slcan:listen:HOST:PORT.
     #[arg(long, value_name = "BUS")]
     bus: LinkAddress,
 }
 
 /// Shows the bus until the user quits.
-pub fn run(args: &MonitorArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &MonitorArgs) -> Result<ExitCode, String> {
     if !io::stdout().is_terminal() {
         return Err(
             "monitor draws on a terminal; use candump and `plant-sim trace` for files".into(),

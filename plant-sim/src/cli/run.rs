@@ -24,7 +24,7 @@ use super::show;
 
 /// Arguments of `run`.
 #[derive(Args, Clone)]
-pub struct RunArgs {
+pub(super) struct RunArgs {
     /// What to run: gate, gate-mismatch, square, pick-place, or a scenario file.
     #[arg(long, value_name = "NAME|FILE", default_value = "gate")]
     scenario: String,
@@ -112,7 +112,7 @@ impl FromStr for BusChoice {
 }
 
 /// Runs the scenario, writes the results and shows the summary.
-pub fn run(args: &RunArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &RunArgs) -> Result<ExitCode, String> {
     let place = place(args)?;
     let mut scenario = input::scenario(&args.scenario).map_err(|error| error.to_string())?;
     if let Some(law) = args.law {
@@ -264,7 +264,7 @@ fn place(args: &RunArgs) -> Result<Place<'_>, String> {
 }
 
 /// The robot of a model file, or the built-in one; warnings go to standard error.
-pub fn load(path: Option<&PathBuf>) -> Result<RobotModel, String> {
+pub(super) fn load(path: Option<&PathBuf>) -> Result<RobotModel, String> {
     let Some(path) = path else {
         return Ok(RobotModel::irb_930_22_105());
     };

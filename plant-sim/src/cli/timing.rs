@@ -14,7 +14,7 @@ use super::show;
 
 /// Arguments of `timing`.
 #[derive(Args)]
-pub struct TimingArgs {
+pub(super) struct TimingArgs {
     /// The bus, with a controller on it (controller --bus BUS --real-time): socketcan:INTERFACE,
     /// slcan:TERMINAL or slcan:tcp:HOST:PORT.
     #[arg(long, value_name = "BUS")]
@@ -31,7 +31,7 @@ pub struct TimingArgs {
 }
 
 /// Measures, prints percentiles and margins, draws the histogram.
-pub fn run(args: &TimingArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &TimingArgs) -> Result<ExitCode, String> {
     scenario::check_rate(args.rate)
         .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
     let time = Duration::from_secs(args.seconds.into());

@@ -26,7 +26,7 @@ use source::{Source, finish_on_signal};
 
 /// Subcommands of `trace`.
 #[derive(Subcommand)]
-pub enum TraceCommand {
+pub(super) enum TraceCommand {
     /// Name every field of every frame, with its unit.
     Decode(DecodeArgs),
     /// Rates, periods, jitter, losses, errors and bus load, by interface and identifier.
@@ -42,7 +42,7 @@ pub enum TraceCommand {
 }
 
 /// Does what the subcommand says.
-pub fn run(command: &TraceCommand) -> Result<ExitCode, String> {
+pub(super) fn run(command: &TraceCommand) -> Result<ExitCode, String> {
     match command {
         TraceCommand::Decode(args) => decode(args),
         TraceCommand::Stats(args) => stats(args),

@@ -1,9 +1,9 @@
-//! Histogram of a timing as SVG: one row a quantity, both axes logarithmic, watchdog limits as lines.
+//! Histogram of a timing as SVG: one row per quantity, both axes logarithmic, watchdog limits as lines.
 
-use std::fmt::Write as _;
 use std::time::Duration;
 
 use super::timing::{Distribution, Timing};
+use crate::chart::Svg;
 
 /// Decades of the time axis, from 1 us on.
 const DECADES: f64 = 5.0;
@@ -14,7 +14,7 @@ const HEIGHT: f64 = 150.0;
 const LEFT: f64 = 70.0;
 const TOP: f64 = 60.0;
 const ROW: f64 = HEIGHT + 70.0;
-/// Lines of text under the rows, one a limit.
+/// Lines of text under the rows, one per limit.
 const LEGEND: f64 = 18.0;
 /// Colour of limits.
 const LIMIT: &str = "#c0392b";
@@ -29,28 +29,24 @@ pub fn histogram(timing: &Timing) -> String {
     let legend = TOP + ROW * rows.len() as f64;
     let limits = timing.limits();
     let (width, height) = (WIDTH + LEFT + 30.0, legend + LEGEND * limits.len() as f64);
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
-         font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
-         <text x=\"{LEFT}\" y=\"24\" font-size=\"16\">Real-time loop: {} samples of {:.0} us, {} commands late, {} overruns</text>\n",
+    let mut page = Svg::new(width, height, 13);
+    let title = format!(
+        "Real-time loop: {} samples of {:.0} us, {} commands late, {} overruns",
         timing.samples(),
         micros(timing.period()),
         timing.missed_commands(),
         timing.overruns()
     );
+    page.text(LEFT, 24.0, r#"font-size="16""#, &title);
     for (index, (name, times)) in rows.into_iter().enumerate() {
-        row(&mut svg, TOP + ROW * index as f64, name, times, timing);
+        row(&mut page, TOP + ROW * index as f64, name, times, timing);
     }
     for (index, (name, limit)) in limits.into_iter().enumerate() {
-        let _ = writeln!(
-            svg,
-            "<text x=\"{LEFT}\" y=\"{}\" fill=\"{LIMIT}\">{} ms: {name}</text>",
-            legend + LEGEND * index as f64,
-            micros(limit) / 1000.0
-        );
+        let line = format!("{} ms: {name}", micros(limit) / 1000.0);
+        let style = format!(r#"fill="{LIMIT}""#);
+        page.text(LEFT, legend + LEGEND * index as f64, &style, &line);
     }
-    svg.push_str("</svg>\n");
-    svg
+    page.finish()
 }
 
 fn micros(time: Duration) -> f64 {
@@ -62,8 +58,9 @@ fn x(us: f64) -> f64 {
     LEFT + WIDTH * (us.max(1.0).log10() / DECADES).min(1.0)
 }
 
-fn row(svg: &mut String, top: f64, name: &str, times: &Distribution, timing: &Timing) {
+fn row(page: &mut Svg, top: f64, name: &str, times: &Distribution, timing: &Timing) {
     let bottom = top + HEIGHT;
+    let right = LEFT + WIDTH;
     let mut bars = vec![0u64; BARS * DECADES as usize + 1];
     for (time, count) in times.classes() {
         let bar = micros(time).max(1.0).log10() * BARS as f64;
@@ -73,88 +70,89 @@ fn row(svg: &mut String, top: f64, name: &str, times: &Distribution, timing: &Ti
     let most = bars.iter().copied().max().unwrap_or(0).max(1) as f64;
     let decades = (most.log10().floor() + 1.0).max(1.0);
     let y = |count: f64| bottom - HEIGHT * (count.log10() + 0.3).max(0.0) / (decades + 0.3);
-    let _ = writeln!(
-        svg,
-        "<text x=\"{LEFT}\" y=\"{}\" font-weight=\"bold\">{name}</text>\n\
-         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">50 % {:.0} us, 99.9 % {:.0} us, max {:.0} us</text>",
-        top - 8.0,
-        LEFT + WIDTH,
-        top - 8.0,
+    page.text(LEFT, top - 8.0, r#"font-weight="bold""#, name);
+    let quantiles = format!(
+        "50 % {:.0} us, 99.9 % {:.0} us, max {:.0} us",
         micros(times.quantile(0.5)),
         micros(times.quantile(0.999)),
         micros(times.max())
     );
+    page.text(right, top - 8.0, r#"text-anchor="end""#, &quantiles);
     for decade in 0..=decades as i32 {
         let count = 10f64.powi(decade);
-        let _ = writeln!(
-            svg,
-            "<line x1=\"{LEFT}\" x2=\"{}\" y1=\"{1:.1}\" y2=\"{1:.1}\" stroke=\"#ddd\"/>\
-             <text x=\"{2}\" y=\"{3:.1}\" text-anchor=\"end\">{count}</text>",
-            LEFT + WIDTH,
-            y(count),
-            LEFT - 6.0,
-            y(count) + 4.0
-        );
+        let at = y(count);
+        page.across(LEFT, right, at, r##"stroke="#ddd""##);
+        let style = r#"text-anchor="end""#;
+        page.text(LEFT - 6.0, at + 4.0, style, &count.to_string());
     }
     for (bar, &count) in bars.iter().enumerate().filter(|(_, count)| **count > 0) {
         let left = x(10f64.powf(bar as f64 / BARS as f64));
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#3b6ea5\"/>",
-            y(count as f64),
-            WIDTH / DECADES / BARS as f64 - 1.0,
-            bottom - y(count as f64)
-        );
+        let (top, width) = (y(count as f64), WIDTH / DECADES / BARS as f64 - 1.0);
+        let style = r##"fill="#3b6ea5""##;
+        page.rectangle([left, top, width, bottom - top], style);
     }
+    let black = r#"stroke="black""#;
     for (decade, label) in ["1 us", "10 us", "100 us", "1 ms", "10 ms", "100 ms"]
         .iter()
         .enumerate()
     {
         let at = x(10f64.powi(decade as i32));
-        let _ = writeln!(
-            svg,
-            "<line x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{bottom}\" y2=\"{}\" stroke=\"black\"/>\
-             <text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{label}</text>",
-            bottom + 5.0,
-            bottom + 20.0
-        );
+        page.down(at, bottom, bottom + 5.0, black);
+        page.text(at, bottom + 20.0, r#"text-anchor="middle""#, label);
     }
-    let _ = writeln!(
-        svg,
-        "<line x1=\"{LEFT}\" x2=\"{}\" y1=\"{bottom}\" y2=\"{bottom}\" stroke=\"black\"/>",
-        LEFT + WIDTH
-    );
+    page.across(LEFT, right, bottom, black);
     for (_, limit) in timing.limits() {
-        let at = x(micros(limit));
-        let _ = writeln!(
-            svg,
-            "<line x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{top}\" y2=\"{bottom}\" stroke=\"{LIMIT}\" stroke-dasharray=\"4 3\"/>"
-        );
+        let style = format!(r#"stroke="{LIMIT}" stroke-dasharray="4 3""#);
+        page.down(x(micros(limit)), top, bottom, &style);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chart::elements;
 
+    /// Left edge and height of every bar below `top`, the page left out.
+    fn bars(svg: &str, top: f64) -> Vec<(f64, f64)> {
+        let elements = elements(svg).into_iter();
+        elements
+            .filter(|(name, numbers)| name == "rect" && numbers.contains_key("x"))
+            .map(|(_, numbers)| (numbers["x"], numbers["y"], numbers["height"]))
+            .filter(|(_, y, height)| (top..=top + HEIGHT).contains(&(y + height)))
+            .map(|(x, _, height)| (x, height))
+            .collect()
+    }
+
+    /// Bars by hand: five decades on 800 units from 70 on, so 10 us begin at 230 and 1 ms at 550. The greatest count, 20,
+    /// has one decade and the next begun: heights are (log10 n + 0.3) / 2.3 of 150.
     #[test]
-    fn every_sample_is_in_a_bar_and_the_picture_is_well_formed() {
-        let ms = Duration::from_millis(1);
-        let mut timing = Timing::new(ms);
-        for sample in 0..1000 {
-            timing.woke(
-                ms * sample,
-                ms * sample + Duration::from_nanos(u64::from(sample) * 77),
-            );
-            timing.answered(Duration::from_micros(u64::from(sample)));
+    fn bars_are_where_and_as_high_as_the_times_are() {
+        let mut timing = Timing::new(Duration::from_millis(1));
+        for (us, count) in [(10, 20), (1_000, 1)] {
+            for _ in 0..count {
+                timing.answered(Duration::from_nanos(us * 1_000 + 500));
+            }
         }
-        timing.answered(Duration::from_secs(10));
         let svg = histogram(&timing);
-        assert_eq!(svg.matches('<').count(), svg.matches('>').count());
-        // Three latencies are far apart: at 0 and 1 us, up to 1 ms, and beyond the axis.
-        assert!(svg.matches("<rect").count() > 3, "{svg}");
-        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-        let empty = histogram(&Timing::new(ms));
-        assert!(!empty.contains("NaN") && !empty.contains("inf"), "{empty}");
+        assert_eq!(bars(&svg, TOP + 2.0 * ROW), [(230.0, 104.4), (550.0, 19.6)]);
+        assert_eq!(bars(&svg, TOP + ROW), []);
+        assert_eq!(
+            bars(&histogram(&Timing::new(Duration::from_millis(1))), TOP),
+            []
+        );
+    }
+
+    /// What is shorter or longer than the axis is at its ends, and not lost.
+    #[test]
+    fn times_beyond_the_axis_are_in_its_outer_bars() {
+        let mut timing = Timing::new(Duration::from_millis(1));
+        timing.answered(Duration::ZERO);
+        timing.answered(Duration::from_secs(10));
+        let left: Vec<_> = bars(&histogram(&timing), TOP + 2.0 * ROW)
+            .into_iter()
+            .map(|(left, _)| left)
+            .collect();
+        assert_eq!((left[0], left.len()), (LEFT, 2));
+        assert!(left[1] > LEFT + WIDTH * 0.9, "{left:?}");
     }
 }

@@ -9,14 +9,14 @@ const FINEST_US: u64 = 250;
 ///
 /// When time passes the last bin, neighbours are merged and every bin is twice as wide: a curve of any length ends
 /// with its bins at least half used, and keeps every peak.
-pub struct Series {
+pub(super) struct Series {
     width_us: u64,
     bins: Vec<Option<Bin>>,
 }
 
 /// Values of one span of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bin {
+pub(super) struct Bin {
     pub min: f32,
     pub max: f32,
 }
@@ -37,7 +37,7 @@ impl Series {
     }
 
     /// Adds a value. Time counts from the start of the trace.
-    pub fn push(&mut self, time_us: u64, value: f32) {
+    pub(super) fn push(&mut self, time_us: u64, value: f32) {
         while time_us / self.width_us >= BINS as u64 {
             self.bins = self
                 .bins
@@ -58,7 +58,7 @@ impl Series {
     }
 
     /// Middle of the span, us, and values, of every span that has any.
-    pub fn bins(&self) -> impl Iterator<Item = (f64, Bin)> {
+    pub(super) fn bins(&self) -> impl Iterator<Item = (f64, Bin)> {
         let width = self.width_us as f64;
         self.bins
             .iter()

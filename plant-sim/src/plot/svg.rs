@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 
 use protocol::messages::Mode;
 
+use crate::chart::{Svg, ticks};
+
 use super::series::Series;
 use super::{Mark, Plot};
 
@@ -22,13 +24,6 @@ const COLOURS: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"];
 /// Style of dots.
 const DOT: &str = r##"stroke="#222" stroke-width="3.2" stroke-linecap="round""##;
 
-/// A line of markup; writing to a string cannot fail.
-macro_rules! line {
-    ($text:expr, $($arg:tt)*) => {{
-        let _ = writeln!($text, $($arg)*);
-    }};
-}
-
 /// What a panel shows: curves in one unit.
 struct Panel<'a> {
     title: &'static str,
@@ -46,49 +41,45 @@ struct Curve<'a> {
     dots: bool,
 }
 
-/// The whole document, with all pictures.
-pub fn page(plots: &[Plot]) -> String {
-    let mut text = String::new();
-    let mut height = 0.0;
+/// The whole document, with all pictures one below the other.
+pub(crate) fn page(plots: &[Plot]) -> String {
+    let height = plots.iter().map(height).sum();
+    let mut page = Svg::new(WIDTH, height, 12);
+    let mut top = 0.0;
     for plot in plots {
-        line!(text, r#"<g transform="translate(0 {height})">"#);
-        height += draw(&mut text, plot);
-        line!(text, "</g>");
+        page.begin_group(top);
+        draw(&mut page, plot);
+        page.end_group();
+        top += self::height(plot);
     }
-    format!(
-        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" font-family="sans-serif" font-size="12" fill="#222">
-<rect width="100%" height="100%" fill="#fff"/>
-{text}</svg>
-"##
-    )
+    page.finish()
 }
 
-/// One picture; gives its height.
-fn draw(text: &mut String, plot: &Plot) -> f64 {
+fn height(plot: &Plot) -> f64 {
+    TOP + panels(plot).len() as f64 * (PANEL + GAP) + 30.0
+}
+
+/// One picture.
+fn draw(page: &mut Svg, plot: &Plot) {
     let panels = panels(plot);
     let span = (plot.newest_us as f64).max(1.0);
-    let height = TOP + panels.len() as f64 * (PANEL + GAP) + 30.0;
-    line!(
-        text,
-        r#"<text x="{LEFT}" y="26" font-size="16" font-weight="bold">{}</text>"#,
-        escape(&plot.title)
-    );
+    let heading = r#"font-size="16" font-weight="bold""#;
+    page.text(LEFT, 26.0, heading, &plot.title);
     if plot.undrawn > 0 {
-        line!(
-            text,
-            r#"<text x="{LEFT}" y="{height:.1}" dy="-8">{} further mode changes and events are not drawn</text>"#,
+        let note = format!(
+            "{} further mode changes and events are not drawn",
             plot.undrawn
         );
+        page.text(LEFT, height(plot) - 8.0, "", &note);
     }
-    modes(text, plot, span);
+    modes(page, plot, span);
     for (index, panel) in panels.iter().enumerate() {
         let top = TOP + index as f64 * (PANEL + GAP);
-        draw_panel(text, panel, top, span);
+        draw_panel(page, panel, top, span);
     }
     let bottom = TOP + panels.len() as f64 * (PANEL + GAP) - GAP;
-    marks(text, &plot.marks, bottom, span);
-    time_axis(text, bottom, span);
-    height
+    marks(page, &plot.marks, bottom, span);
+    time_axis(page, bottom, span);
 }
 
 fn panels(plot: &Plot) -> Vec<Panel<'_>> {
@@ -151,7 +142,7 @@ fn x(time_us: f64, span: f64) -> f64 {
     LEFT + time_us / span * (WIDTH - LEFT - RIGHT)
 }
 
-fn draw_panel(text: &mut String, panel: &Panel, top: f64, span: f64) {
+fn draw_panel(page: &mut Svg, panel: &Panel, top: f64, span: f64) {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (_, bin) in panel.curves.iter().flat_map(|curve| curve.series.bins()) {
         low = low.min(f64::from(bin.min) * panel.scale);
@@ -168,69 +159,39 @@ fn draw_panel(text: &mut String, panel: &Panel, top: f64, span: f64) {
 
     for tick in ticks(low, high, 5) {
         let at = y(tick.value);
-        line!(
-            text,
-            r##"<path d="M{LEFT} {at:.1}H{right}" stroke="#e4e4e4"/><text x="{:.1}" y="{:.1}" text-anchor="end" font-size="11">{}</text>"##,
-            LEFT - 6.0,
-            at + 4.0,
-            tick.label
-        );
+        page.across(LEFT, right, at, r##"stroke="#e4e4e4""##);
+        let style = r#"text-anchor="end" font-size="11""#;
+        page.text(LEFT - 6.0, at + 4.0, style, &tick.label);
     }
-    line!(
-        text,
-        r##"<rect x="{LEFT}" y="{top}" width="{:.1}" height="{PANEL}" fill="none" stroke="#888"/>"##,
-        right - LEFT
-    );
-    line!(
-        text,
-        r#"<text x="{LEFT}" y="{:.1}" font-weight="bold">{} / {}</text>"#,
-        top - 6.0,
-        panel.title,
-        panel.unit
-    );
+    let frame = r##"fill="none" stroke="#888""##;
+    page.rectangle([LEFT, top, right - LEFT, PANEL], frame);
+    let title = format!("{} / {}", panel.title, panel.unit);
+    page.text(LEFT, top - 6.0, r#"font-weight="bold""#, &title);
     for curve in &panel.curves {
         let (x, y) = (|time| x(time, span), |value| y(value * panel.scale));
         if curve.dots {
-            let dots = dots(curve.series, x, y);
-            line!(text, r#"<path {DOT} d="{dots}"/>"#);
+            page.path(&dots(curve.series, x, y), DOT);
         } else {
-            line!(
-                text,
-                r#"<polyline fill="none" stroke-width="1.3" stroke="{}" points="{}"/>"#,
-                curve.colour,
-                points(curve.series, x, y)
-            );
+            let style = format!(r#"stroke-width="1.3" stroke="{}""#, curve.colour);
+            page.polyline(&points(curve.series, x, y), &style);
         }
     }
-    legend(text, panel, top);
+    legend(page, panel, top);
 }
 
-fn legend(text: &mut String, panel: &Panel, top: f64) {
+fn legend(page: &mut Svg, panel: &Panel, top: f64) {
     let left = WIDTH - RIGHT + 10.0;
-    let actual = panel.curves.iter().filter(|curve| !curve.dots);
-    let mut row = 0.0;
-    for curve in actual {
-        let at = top + 12.0 + row * 17.0;
-        line!(
-            text,
-            r#"<path d="M{left} {:.1}h22" stroke="{}" stroke-width="2"/><text x="{:.1}" y="{:.1}">{}</text>"#,
-            at - 4.0,
-            curve.colour,
-            left + 28.0,
-            at,
-            curve.name
-        );
-        row += 1.0;
+    let mut at = top + 12.0;
+    for curve in panel.curves.iter().filter(|curve| !curve.dots) {
+        let style = format!(r#"stroke="{}" stroke-width="2""#, curve.colour);
+        page.across(left, left + 22.0, at - 4.0, &style);
+        page.text(left + 28.0, at, "", curve.name);
+        at += 17.0;
     }
     if panel.curves.iter().any(|curve| curve.dots) {
-        let at = top + 12.0 + row * 17.0;
-        line!(
-            text,
-            r#"<path {DOT} d="M{:.1} {:.1}h0m9 0h0m9 0h0"/><text x="{:.1}" y="{at:.1}">set</text>"#,
-            left + 2.0,
-            at - 4.0,
-            left + 28.0
-        );
+        let dots = format!("M{:.1} {:.1}h0m9 0h0m9 0h0", left + 2.0, at - 4.0);
+        page.path(&dots, DOT);
+        page.text(left + 28.0, at, "", "set");
     }
 }
 
@@ -262,20 +223,12 @@ fn points(series: &Series, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> St
 }
 
 /// A strip of the modes over time.
-fn modes(text: &mut String, plot: &Plot, span: f64) {
+fn modes(page: &mut Svg, plot: &Plot, span: f64) {
     let top = TOP - STRIP - 22.0;
-    line!(
-        text,
-        r#"<text x="{:.1}" y="{:.1}" text-anchor="end" font-weight="bold">mode</text>"#,
-        LEFT - 6.0,
-        top + 14.0
-    );
-    line!(
-        text,
-        r##"<text x="{:.1}" y="{:.1}" text-anchor="end" font-size="10" fill="#555">requests</text>"##,
-        LEFT - 6.0,
-        top - 2.0
-    );
+    let bold = r#"text-anchor="end" font-weight="bold""#;
+    page.text(LEFT - 6.0, top + 14.0, bold, "mode");
+    let small = r##"text-anchor="end" font-size="10" fill="#555""##;
+    page.text(LEFT - 6.0, top - 2.0, small, "requests");
     let ends = plot
         .modes
         .iter()
@@ -285,20 +238,16 @@ fn modes(text: &mut String, plot: &Plot, span: f64) {
     for ((start, mode), end) in plot.modes.iter().zip(ends) {
         let (left, right) = (x(*start as f64, span), x(end, span));
         let width = right - left;
-        line!(
-            text,
-            r##"<rect x="{left:.1}" y="{top:.1}" width="{width:.1}" height="{STRIP}" fill="{}" stroke="#fff" stroke-width="0.5"><title>{mode} from {:.3} s</title></rect>"##,
-            colour(*mode),
-            *start as f64 / 1e6
+        let style = format!(
+            r##"fill="{}" stroke="#fff" stroke-width="0.5""##,
+            colour(*mode)
         );
+        let name = format!("{mode} from {:.3} s", *start as f64 / 1e6);
+        page.named_rectangle([left, top, width, STRIP], &style, &name);
         // A name that would not fit is left to the tooltip: letters of this size take 7 units.
         if width > 7.0 * mode.name().len() as f64 {
-            line!(
-                text,
-                r#"<text x="{:.1}" y="{:.1}" font-size="11" text-anchor="middle">{mode}</text>"#,
-                left + width / 2.0,
-                top + 14.0
-            );
+            let style = r#"font-size="11" text-anchor="middle""#;
+            page.text(left + width / 2.0, top + 14.0, style, mode.name());
         }
     }
 }
@@ -316,7 +265,8 @@ fn colour(mode: Mode) -> &'static str {
 }
 
 /// Faults as red lines with their names, requests as grey ticks above the panels.
-fn marks(text: &mut String, marks: &[Mark], bottom: f64, span: f64) {
+fn marks(page: &mut Svg, marks: &[Mark], bottom: f64, span: f64) {
+    let name = |mark: &Mark| format!("{} at {:.3} s", mark.text, mark.time_us as f64 / 1e6);
     for (index, mark) in marks.iter().filter(|mark| mark.grave).enumerate() {
         let at = x(mark.time_us as f64, span);
         // Neighbouring names take turns on three lines.
@@ -326,75 +276,25 @@ fn marks(text: &mut String, marks: &[Mark], bottom: f64, span: f64) {
         } else {
             ("start", 4.0)
         };
-        line!(
-            text,
-            r##"<path d="M{at:.1} {:.1}V{bottom:.1}" stroke="#c00" stroke-width="1.2"/><text x="{:.1}" y="{height:.1}" fill="#c00" text-anchor="{anchor}">{} at {:.3} s</text>"##,
-            height - 10.0,
-            at + shift,
-            escape(&mark.text),
-            mark.time_us as f64 / 1e6
-        );
+        let stroke = r##"stroke="#c00" stroke-width="1.2""##;
+        page.down(at, height - 10.0, bottom, stroke);
+        let style = format!(r##"fill="#c00" text-anchor="{anchor}""##);
+        page.text(at + shift, height, &style, &name(mark));
     }
     for mark in marks.iter().filter(|mark| !mark.grave) {
-        let at = x(mark.time_us as f64, span);
-        line!(
-            text,
-            r##"<path d="M{at:.1} {:.1}v-5" stroke="#555" stroke-width="1.5"><title>{} at {:.3} s</title></path>"##,
-            TOP - STRIP - 23.0,
-            escape(&mark.text),
-            mark.time_us as f64 / 1e6
-        );
+        let (at, foot) = (x(mark.time_us as f64, span), TOP - STRIP - 23.0);
+        let stroke = r##"stroke="#555" stroke-width="1.5""##;
+        page.named_down(at, foot, foot - 5.0, stroke, &name(mark));
     }
 }
 
-fn time_axis(text: &mut String, bottom: f64, span: f64) {
+fn time_axis(page: &mut Svg, bottom: f64, span: f64) {
     for tick in ticks(0.0, span / 1e6, 10) {
         let at = x(tick.value * 1e6, span);
-        line!(
-            text,
-            r##"<path d="M{at:.1} {bottom:.1}v5M{at:.1} {TOP}V{bottom:.1}" stroke="#888" stroke-opacity="0.3"/><text x="{at:.1}" y="{:.1}" text-anchor="middle" font-size="11">{}</text>"##,
-            bottom + 18.0,
-            tick.label
-        );
+        let stroke = r##"stroke="#888" stroke-opacity="0.3""##;
+        page.down(at, TOP, bottom + 5.0, stroke);
+        let style = r#"text-anchor="middle" font-size="11""#;
+        page.text(at, bottom + 18.0, style, &tick.label);
     }
-    line!(
-        text,
-        r#"<text x="{:.1}" y="{:.1}">time / s</text>"#,
-        WIDTH - RIGHT + 10.0,
-        bottom + 18.0
-    );
-}
-
-struct Tick {
-    value: f64,
-    label: String,
-}
-
-/// Round values between two bounds, about `count` of them: steps of 1, 2 or 5 times a power of ten.
-fn ticks(low: f64, high: f64, count: u32) -> Vec<Tick> {
-    let rough = (high - low) / f64::from(count);
-    let power = 10_f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0]
-        .map(|factor| factor * power)
-        .into_iter()
-        .find(|step| *step >= rough)
-        .unwrap_or(10.0 * power);
-    let decimals = (-step.log10().floor()).max(0.0) as usize;
-    let first = (low / step).ceil() as i64;
-    let last = (high / step).floor() as i64;
-    (first..=last)
-        .map(|number| {
-            let value = number as f64 * step;
-            Tick {
-                value,
-                label: format!("{value:.decimals$}"),
-            }
-        })
-        .collect()
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    page.text(WIDTH - RIGHT + 10.0, bottom + 18.0, "", "time / s");
 }

@@ -8,7 +8,7 @@ use defmt_decoder::{DecodeError, Table};
 ///
 /// # Errors
 /// The image has no messages, or those of another version of defmt.
-pub fn decode(image: &[u8], log: &[u8]) -> Result<String, String> {
+pub(super) fn decode(image: &[u8], log: &[u8]) -> Result<String, String> {
     let table = Table::parse(image)
         .map_err(|error| error.to_string())?
         .ok_or("the image has no messages (no section .defmt)")?;

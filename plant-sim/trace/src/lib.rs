@@ -1,5 +1,19 @@
 //! Bus traces as candump logs, one frame a line: what the bench writes, can-utils reads, and the other way round.
 //!
+//! # What lives here
+//!
+//! [`Reader`] and [`Writer`] turn lines into [`Record`]s and back. [`decode`] names every field of a frame, [`stats`]
+//! counts rates, jitter, gaps and losses, [`convert`] writes pcapng and Vector ASC, [`dbc`] the message table for other
+//! tools. All stream: memory does not grow with a trace. The crate leans on [`protocol`] alone; what needs a robot or a
+//! controller (replay, check, plot) is in `plant-sim`.
+//!
+//! # The way of one Feedback frame
+//!
+//! Delivered on the bus it becomes one line through [`Writer`]; later [`Reader`] makes the same frame of the line, and
+//! [`decode`] looks it up in the protocol's table to print counts, velocities and torques with their units.
+//!
+//! # The format
+//!
 //! ```text
 //! (0000000012.345678) can0 1C0##1000102...        FD with bit rate switch
 //! (0000000012.345801) can0 18FF1234#DEADBEEF      29-bit identifier

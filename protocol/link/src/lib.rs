@@ -1,10 +1,18 @@
 //! Ends of a CAN bus on a Linux host: SocketCAN and serial-line adapters (slcan).
 //!
-//! A [`Link`] is a [`Bus`] that can also be waited for. A person names one as text, a [`LinkAddress`]. The crate leans on
-//! [`protocol`] alone; what frames mean is not its business. A Feedback frame that arrives on vcan0 is read by
-//! [`SocketCan`], stamped by the kernel ([`Stamped`]), and taken by the controller's process through [`Bus::receive`];
-//! the Command goes out through [`Transmit::transmit`]. The programs that need a thread of real-time priority or a sleep until
-//! an instant find them in [`realtime`].
+//! # What lives here
+//!
+//! A [`Link`] is a [`Bus`] that can also be waited for. A person names one as text, a [`LinkAddress`]; behind it is
+//! [`SocketCan`], an [`SlcanPort`] (one serial line or TCP connection) or an [`SlcanHub`] (a server of many). [`realtime`]
+//! has what a process in real time asks of Linux: priority, locked memory, a sleep until an instant.
+//!
+//! The crate leans on [`protocol`] alone; what frames mean is not its business. The controller's process and the
+//! simulator's external controllers, monitor and player call it.
+//!
+//! # The way of one Feedback frame
+//!
+//! A frame that arrives on vcan0 is read by [`SocketCan`], stamped by the kernel ([`Stamped`]), and taken by the
+//! controller's process through [`Bus::receive`]; the Command goes out through [`Transmit::transmit`].
 
 #![forbid(unsafe_code)]
 

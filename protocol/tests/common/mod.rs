@@ -5,7 +5,11 @@
 use proptest::array::{uniform3, uniform4};
 use proptest::prelude::*;
 use proptest::sample::select;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+use protocol::frame::{CanFrame, StandardId};
 use protocol::messages::*;
+use protocol::schema::MessageInfo;
 
 fn any_f32() -> impl Strategy<Value = f32> {
     use proptest::num::f32::{NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
@@ -20,7 +24,7 @@ fn fraction() -> impl Strategy<Value = f32> {
     0.0..=1.0f32
 }
 
-pub fn node() -> impl Strategy<Value = Node> {
+pub(crate) fn node() -> impl Strategy<Value = Node> {
     select(Node::ALL)
 }
 
@@ -47,7 +51,7 @@ fn emergency() -> impl Strategy<Value = Message> {
         .prop_map(|(node, cause, data)| Message::Emergency(node, Emergency::new(cause, data)))
 }
 
-pub fn feedback() -> impl Strategy<Value = Message> {
+pub(crate) fn feedback() -> impl Strategy<Value = Message> {
     (
         any::<u32>(),
         0..0x80u8,
@@ -66,7 +70,7 @@ pub fn feedback() -> impl Strategy<Value = Message> {
         })
 }
 
-pub fn command() -> impl Strategy<Value = Message> {
+pub(crate) fn command() -> impl Strategy<Value = Message> {
     (any::<u32>(), 0..0x10u8, uniform4(-20.0..=20.0f32)).prop_map(|(sample, control, torque)| {
         Message::Command(Command {
             sample,
@@ -202,7 +206,7 @@ fn parameter_reply() -> impl Strategy<Value = Message> {
     (server(), reply).prop_map(|(server, reply)| Message::ParameterReply(server, reply))
 }
 
-pub fn heartbeat() -> impl Strategy<Value = Message> {
+pub(crate) fn heartbeat() -> impl Strategy<Value = Message> {
     (
         node(),
         select(Mode::ALL),
@@ -222,7 +226,7 @@ pub fn heartbeat() -> impl Strategy<Value = Message> {
 }
 
 /// Any message with any values that are allowed in it.
-pub fn message() -> impl Strategy<Value = Message> {
+pub(crate) fn message() -> impl Strategy<Value = Message> {
     prop_oneof![
         nmt(),
         estop(),
@@ -239,7 +243,7 @@ pub fn message() -> impl Strategy<Value = Message> {
 }
 
 /// CRC bit by bit, most significant bit first, as its polynomial division is defined: the second derivation.
-pub fn bitwise_crc(width: u32, poly: u16, init: u16, xor_out: u16, bytes: &[u8]) -> u16 {
+pub(crate) fn bitwise_crc(width: u32, poly: u16, init: u16, xor_out: u16, bytes: &[u8]) -> u16 {
     let top = 1 << (width - 1);
     let mask = (top - 1) | top;
     let mut crc = init;
@@ -256,7 +260,7 @@ pub fn bitwise_crc(width: u32, poly: u16, init: u16, xor_out: u16, bytes: &[u8])
 }
 
 /// CRC-16/IBM-3740 of identifier and bytes.
-pub fn crc16(id: u16, bytes: &[u8]) -> u16 {
+pub(crate) fn crc16(id: u16, bytes: &[u8]) -> u16 {
     let input: Vec<u8> = id
         .to_be_bytes()
         .into_iter()
@@ -266,7 +270,7 @@ pub fn crc16(id: u16, bytes: &[u8]) -> u16 {
 }
 
 /// CRC-8/AUTOSAR of identifier and bytes.
-pub fn crc8(id: u16, bytes: &[u8]) -> u8 {
+pub(crate) fn crc8(id: u16, bytes: &[u8]) -> u8 {
     let input: Vec<u8> = id
         .to_be_bytes()
         .into_iter()
@@ -276,13 +280,42 @@ pub fn crc8(id: u16, bytes: &[u8]) -> u8 {
 }
 
 /// A small reproducible source of bytes (xorshift64), for tests that count.
-pub struct Bytes(pub u64);
+pub(crate) struct Bytes(pub u64);
 
 impl Bytes {
-    pub fn next(&mut self) -> u8 {
+    pub(crate) fn next(&mut self) -> u8 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         (self.0 >> 32) as u8
     }
+}
+
+/// A frame on this identifier.
+pub(crate) fn frame_of(id: u16, fd: bool, data: &[u8]) -> CanFrame {
+    let id = StandardId::new(id).unwrap();
+    if fd {
+        CanFrame::fd(id, data, true)
+    } else {
+        CanFrame::classical(id, data)
+    }
+    .unwrap()
+}
+
+/// A frame with this body, zero-padded, and right protection: the sender's software is wrong, the wire is not.
+pub(crate) fn protected(info: &MessageInfo, body: &[u8]) -> CanFrame {
+    let mut data = vec![0; info.len];
+    data[..body.len()].copy_from_slice(body);
+    if let Some(profile) = info.protection {
+        profile.protect(info.id, 1, &mut data);
+    }
+    frame_of(info.id, info.is_fd(), &data)
+}
+
+/// One of the random messages, always the same.
+pub(crate) fn sample(strategy: impl Strategy<Value = Message>) -> Message {
+    strategy
+        .new_tree(&mut TestRunner::deterministic())
+        .unwrap()
+        .current()
 }

@@ -7,14 +7,14 @@ use serde_json::Value;
 use tests::{Row, reference};
 
 /// Unit roundoff of f32: half the distance between 1 and the next number, 2^-24.
-pub const U32: f64 = 0.5 * f32::EPSILON as f64;
+pub(crate) const U32: f64 = 0.5 * f32::EPSILON as f64;
 
 /// Unit roundoff of f64, 2^-53.
-pub const U64: f64 = 0.5 * f64::EPSILON;
+pub(crate) const U64: f64 = 0.5 * f64::EPSILON;
 
 /// A rigid link: mass, centre of mass in its standard-DH frame, inertia about the centre of mass.
 #[derive(Clone, Copy)]
-pub struct Link {
+pub(crate) struct Link {
     pub mass: f64,
     pub com: Vector3<f64>,
     pub inertia: Matrix3<f64>,
@@ -48,7 +48,7 @@ impl Link {
 /// The arm of the reference tables, in f64 and from their own model file, so that rounding the controller's constants to
 /// f32 cannot pass for a property of a formula.
 #[derive(Clone, Copy)]
-pub struct Arm {
+pub(crate) struct Arm {
     pub a1: f64,
     pub a2: f64,
     pub d4: f64,
@@ -60,12 +60,12 @@ pub struct Arm {
 
 impl Arm {
     /// The bare arm.
-    pub fn bare() -> Self {
+    pub(crate) fn bare() -> Self {
         Self::from_json(&model())
     }
 
     /// The arm as the `payload` column of `dynamics.csv` names it: `none` or `p10`.
-    pub fn with_payload(label: &str) -> Self {
+    pub(crate) fn with_payload(label: &str) -> Self {
         let model = model();
         let mut arm = Self::from_json(&model);
         match label {
@@ -80,7 +80,7 @@ impl Arm {
     }
 
     /// Mass that the lift carries: carriage, shaft and payload (kg).
-    pub fn lifted_mass(&self) -> f64 {
+    pub(crate) fn lifted_mass(&self) -> f64 {
         self.links[2].mass + self.links[3].mass
     }
 
@@ -115,7 +115,7 @@ fn vector(value: &Value) -> Vector3<f64> {
 
 /// Joint position, velocity and acceleration of a row; acceleration is zero where the table has none.
 #[derive(Clone, Copy)]
-pub struct State {
+pub(crate) struct State {
     pub q: Vector4<f64>,
     pub qd: Vector4<f64>,
     pub qdd: Vector4<f64>,
@@ -123,7 +123,7 @@ pub struct State {
 
 impl State {
     /// The state of a row of a dynamics table.
-    pub fn of(row: &Row) -> Self {
+    pub(crate) fn of(row: &Row) -> Self {
         Self {
             q: row.vector("q"),
             qd: row.vector("qd"),
@@ -134,18 +134,18 @@ impl State {
 
 /// Angular and linear velocity of a frame.
 #[derive(Clone, Copy, Default)]
-pub struct Twist {
+pub(crate) struct Twist {
     pub angular: Vector3<f64>,
     pub linear: Vector3<f64>,
 }
 
 /// Rotation part of a homogeneous transform.
-pub fn rotation(t: &Matrix4<f64>) -> Matrix3<f64> {
+pub(crate) fn rotation(t: &Matrix4<f64>) -> Matrix3<f64> {
     t.fixed_view::<3, 3>(0, 0).into_owned()
 }
 
 /// Translation part of a homogeneous transform.
-pub fn translation(t: &Matrix4<f64>) -> Vector3<f64> {
+pub(crate) fn translation(t: &Matrix4<f64>) -> Vector3<f64> {
     t.fixed_view::<3, 1>(0, 3).into_owned()
 }
 
@@ -157,12 +157,12 @@ fn greater(so_far: f64, value: &f64) -> f64 {
 }
 
 /// The largest magnitude among the elements of a vector or matrix.
-pub fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
+pub(crate) fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
     values.into_iter().fold(0.0, greater)
 }
 
 /// Largest error of the printed and of the corrected form over some cases.
-pub fn worst<T>(
+pub(crate) fn worst<T>(
     cases: impl IntoIterator<Item = T>,
     errors: impl Fn(T) -> (f64, f64),
 ) -> (f64, f64) {
@@ -173,13 +173,13 @@ pub fn worst<T>(
 }
 
 /// The largest of `bound` over some cases.
-pub fn bound_over<T>(cases: impl IntoIterator<Item = T>, bound: impl Fn(T) -> f64) -> f64 {
+pub(crate) fn bound_over<T>(cases: impl IntoIterator<Item = T>, bound: impl Fn(T) -> f64) -> f64 {
     worst(cases, |case| (bound(case), 0.0)).0
 }
 
 /// Prints the two errors against the oracle and asserts that the printed form is wrong by at least `wrong_by` and the
 /// corrected one right within `right_within`.
-pub fn verdict(
+pub(crate) fn verdict(
     erratum: u8,
     what: &str,
     unit: &str,

@@ -8,7 +8,7 @@ use crate::paper::lagrange as paper;
 use crate::product::{self, Dynamics};
 
 /// What eq. 40-43 take from the arm. Table 1 has no a3: the length of link 3 is zero.
-pub fn given(arm: &Arm) -> paper::Given {
+pub(crate) fn given(arm: &Arm) -> paper::Given {
     paper::Given {
         m: [arm.links[0].mass, arm.links[1].mass, arm.links[2].mass],
         a: [arm.a1, arm.a2, 0.0],
@@ -17,7 +17,7 @@ pub fn given(arm: &Arm) -> paper::Given {
 }
 
 /// Eq. 40-43 with the state put in.
-pub fn as_printed(given: &paper::Given, state: &State) -> Vector4<f64> {
+pub(crate) fn as_printed(given: &paper::Given, state: &State) -> Vector4<f64> {
     let rates = state.qd.xy();
     paper::eq_40_to_43(given, &state.q, &rates, &rates)
 }
@@ -31,7 +31,7 @@ fn at_rest(state: &State) -> State {
 }
 
 /// The arm without payload, to which eq. 40-43 come closest, in f64 and as the controller has it, and its table.
-pub fn empty_flange() -> (Arm, Table, Dynamics) {
+pub(crate) fn empty_flange() -> (Arm, Table, Dynamics) {
     (
         Arm::bare(),
         Table::load("dynamics.csv"),
@@ -40,7 +40,7 @@ pub fn empty_flange() -> (Arm, Table, Dynamics) {
 }
 
 /// The rows without payload.
-pub fn bare(table: &Table) -> impl Iterator<Item = Row<'_>> {
+pub(crate) fn bare(table: &Table) -> impl Iterator<Item = Row<'_>> {
     table.rows_where("payload", "none")
 }
 

@@ -25,14 +25,14 @@ const ARM: ArmModel = ArmModel {
 };
 
 /// A law with the arm and payload it knows and its gains, critically damped.
-pub struct Controller {
+pub(crate) struct Controller {
     selection: Selection,
     body: Body,
 }
 
 impl Controller {
     /// A law at a bandwidth (rad/s), with the payload of a table.
-    pub fn new(law: Law, bandwidth: f64, label: &str) -> Self {
+    pub(crate) fn new(law: Law, bandwidth: f64, label: &str) -> Self {
         let gains = Gains {
             bandwidth: bandwidth as f32,
             damping: 1.0,
@@ -48,7 +48,7 @@ impl Controller {
     }
 
     /// Joint efforts in a state, with the reference as it is now: no delay to make up for.
-    pub fn efforts(
+    pub(crate) fn efforts(
         &self,
         reference: &State,
         (q, qd): (Vector4<f64>, Vector4<f64>),
@@ -84,6 +84,6 @@ impl Controller {
 
 /// What rounding position and velocity to f32 does to a critically damped error equation (rad, m): positions up to 7
 /// rad, and velocities `speed` over half the bandwidth, for state and reference each.
-pub fn sensing_bound(speed: f64, bandwidth: f64) -> f64 {
+pub(crate) fn sensing_bound(speed: f64, bandwidth: f64) -> f64 {
     2.0 * U32 * (7.0 + 2.0 * speed / bandwidth)
 }

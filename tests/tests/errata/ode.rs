@@ -5,7 +5,7 @@ use std::ops::{Add, Mul};
 use nalgebra::{SVector, Vector4};
 
 /// Integrates `xd = f(t, x)` from 0 to `end` with the classical Runge-Kutta method, calling `each` after every step.
-pub fn integrate<X>(
+pub(crate) fn integrate<X>(
     mut x: X,
     end: f64,
     steps: u32,
@@ -29,11 +29,11 @@ where
 }
 
 /// Position and velocity as one state.
-pub fn stack(upper: &Vector4<f64>, lower: &Vector4<f64>) -> SVector<f64, 8> {
+pub(crate) fn stack(upper: &Vector4<f64>, lower: &Vector4<f64>) -> SVector<f64, 8> {
     SVector::from_fn(|i, _| if i < 4 { upper[i] } else { lower[i - 4] })
 }
 
 /// The inverse of [`stack`].
-pub fn split(x: &SVector<f64, 8>) -> (Vector4<f64>, Vector4<f64>) {
+pub(crate) fn split(x: &SVector<f64, 8>) -> (Vector4<f64>, Vector4<f64>) {
     (x.fixed_rows::<4>(0).into(), x.fixed_rows::<4>(4).into())
 }

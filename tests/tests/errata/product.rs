@@ -10,7 +10,7 @@ use firmware::mechanics::dynamics::lagrange::Lagrange;
 use firmware::mechanics::dynamics::newton_euler;
 use firmware::mechanics::jacobian::Jacobian;
 use firmware::mechanics::kinematics::{self, Pose, Trig};
-pub use firmware::mechanics::kinematics::{Elbow, IkError};
+pub(crate) use firmware::mechanics::kinematics::{Elbow, IkError};
 use firmware::mechanics::velocity::propagate;
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 use tests::{Row, Table};
@@ -21,20 +21,20 @@ const GEOMETRY: &Geometry = &IRB_930.geometry;
 
 /// Error of an angle of the flange (rad) and of an element of a rotation: 12.1 u of the inputs, 9.1 u of the sine of a sum
 /// of angles, 17.2 u of summing the angles of the yaw or 8 u of products, 6.3 u of wrapping.
-pub const ANGLE_BOUND: f64 = 48.0 * U32;
+pub(crate) const ANGLE_BOUND: f64 = 48.0 * U32;
 
 /// Error of a coordinate of the flange or an element of the Jacobian (m): angles off as above, times the reach.
-pub fn position_bound(arm: &Arm) -> f64 {
+pub(crate) fn position_bound(arm: &Arm) -> f64 {
     ANGLE_BOUND * (arm.a1 + arm.a2)
 }
 
 /// Relative error of an element of the mass matrix that holds no angle: rounded constants and their sums.
-pub const MASS_ROUNDINGS: f64 = 8.0 * U32;
+pub(crate) const MASS_ROUNDINGS: f64 = 8.0 * U32;
 
 /// Rounding of the recursive Newton-Euler algorithm, as a fraction of the sum of magnitudes that goes through it: 15 u for
 /// inputs, and for each of four frames 6 u to carry a vector outwards, 6 u for the acceleration of the next origin, and 10 u
 /// to carry force and moment back and add them up, and 6 u for the inertial force of a link.
-pub const RECURSION_ROUNDINGS: f64 = 128.0 * U32;
+pub(crate) const RECURSION_ROUNDINGS: f64 = 128.0 * U32;
 
 fn f32s(v: &Vector4<f64>) -> Vector4<f32> {
     v.cast()
@@ -49,23 +49,23 @@ fn jacobian_at(q: &Vector4<f64>) -> Jacobian {
 }
 
 /// Upper joint limits.
-pub fn upper_limit() -> Vector4<f64> {
+pub(crate) fn upper_limit() -> Vector4<f64> {
     IRB_930.limits.upper.cast()
 }
 
 /// x, y, z, yaw of the flange.
-pub fn forward(q: &Vector4<f64>) -> Vector4<f64> {
+pub(crate) fn forward(q: &Vector4<f64>) -> Vector4<f64> {
     let Pose { x, y, z, yaw } = kinematics::forward(GEOMETRY, &f32s(q));
     Vector4::new(x, y, z, yaw).cast()
 }
 
 /// Orientation of the flange.
-pub fn rotation(q: &Vector4<f64>) -> Matrix3<f64> {
+pub(crate) fn rotation(q: &Vector4<f64>) -> Matrix3<f64> {
     kinematics::rotation(&trig(q)).cast()
 }
 
 /// The target x, y, z, yaw of a row of `ik.csv`.
-pub fn pose(row: &Row) -> Vector4<f64> {
+pub(crate) fn pose(row: &Row) -> Vector4<f64> {
     Vector4::from(["x", "y", "z", "yaw"].map(|column| row.f64(column)))
 }
 
@@ -75,14 +75,14 @@ fn to_pose(pose: &Vector4<f64>) -> Pose {
 }
 
 /// Inverse kinematics by geometry alone, of a row that has a solution.
-pub fn solve(row: &Row, elbow: Elbow) -> Vector4<f64> {
+pub(crate) fn solve(row: &Row, elbow: Elbow) -> Vector4<f64> {
     kinematics::solve(GEOMETRY, &to_pose(&pose(row)), elbow)
         .unwrap_or_else(|e| panic!("{row}: {e}"))
         .cast()
 }
 
 /// Inverse kinematics within the joint limits.
-pub fn inverse(
+pub(crate) fn inverse(
     pose: &Vector4<f64>,
     elbow: Elbow,
     near: &Vector4<f64>,
@@ -91,7 +91,7 @@ pub fn inverse(
 }
 
 /// Whether a refusal names the `reason` of `ik.csv`.
-pub fn reason_fits(refusal: &IkError, reason: &str) -> bool {
+pub(crate) fn reason_fits(refusal: &IkError, reason: &str) -> bool {
     let expected = match reason {
         "too_far" => return matches!(refusal, IkError::TooFar { .. }),
         "inside_hole" => return matches!(refusal, IkError::TooNear { .. }),
@@ -106,7 +106,7 @@ pub fn reason_fits(refusal: &IkError, reason: &str) -> bool {
 /// Error of theta1 and theta2 (rad) for the target of a row. Its radius r is known to 8 u of the reach (rounded target,
 /// hypot, rounded lengths), which theta2 multiplies by r / det J and theta1 by as much again times
 /// a2 (a1 + a2) / r^2; four arc tangents and sums add 4 u of pi each.
-pub fn ik_bound(arm: &Arm, row: &Row) -> f64 {
+pub(crate) fn ik_bound(arm: &Arm, row: &Row) -> f64 {
     let reach = arm.a1 + arm.a2;
     let r = pose(row).xy().norm();
     let theta2 = r * 8.0 * U32 * reach / row.f64("detJ_a").abs();
@@ -114,29 +114,29 @@ pub fn ik_bound(arm: &Arm, row: &Row) -> f64 {
 }
 
 /// The 6x4 Jacobian.
-pub fn jacobian(q: &Vector4<f64>) -> SMatrix<f64, 6, 4> {
+pub(crate) fn jacobian(q: &Vector4<f64>) -> SMatrix<f64, 6, 4> {
     jacobian_at(q).geometric().cast()
 }
 
 /// Determinant of the task Jacobian.
-pub fn determinant(q: &Vector4<f64>) -> f64 {
+pub(crate) fn determinant(q: &Vector4<f64>) -> f64 {
     jacobian_at(q).determinant().into()
 }
 
 /// Inverse of the 4x4 task Jacobian.
-pub fn task_inverse(q: &Vector4<f64>) -> Matrix4<f64> {
+pub(crate) fn task_inverse(q: &Vector4<f64>) -> Matrix4<f64> {
     let inverse = jacobian_at(q).inverse();
     inverse.expect("a state off the singularity").cast()
 }
 
 /// Joint speeds for a task velocity, damped near the singularity.
-pub fn joint_speed_damped(q: &Vector4<f64>, v: &Vector4<f64>) -> Vector4<f64> {
+pub(crate) fn joint_speed_damped(q: &Vector4<f64>, v: &Vector4<f64>) -> Vector4<f64> {
     jacobian_at(q).joint_speed_damped(&f32s(v)).cast()
 }
 
 /// Error of J times the inverse: an element of the inverse is at most reach / det; its numerator is off by as much as a
 /// coordinate, and 1 / sin theta2 by 8 u / sin theta2 of itself. Three such elements make one of the product.
-pub fn inverse_jacobian_bound(arm: &Arm, q: &Vector4<f64>) -> f64 {
+pub(crate) fn inverse_jacobian_bound(arm: &Arm, q: &Vector4<f64>) -> f64 {
     let reach = arm.a1 + arm.a2;
     let s2 = q.y.sin().abs();
     let element = reach / (arm.a1 * arm.a2 * s2) * (ANGLE_BOUND + 8.0 * U32 / s2);
@@ -144,17 +144,17 @@ pub fn inverse_jacobian_bound(arm: &Arm, q: &Vector4<f64>) -> f64 {
 }
 
 /// Task acceleration J' qd at zero joint acceleration.
-pub fn rate_product(q: &Vector4<f64>, qd: &Vector4<f64>) -> Vector4<f64> {
+pub(crate) fn rate_product(q: &Vector4<f64>, qd: &Vector4<f64>) -> Vector4<f64> {
     jacobian_at(q).bias(&f32s(qd)).cast()
 }
 
 /// An angle brought into (-pi, pi].
-pub fn wrap(angle: f64) -> f64 {
+pub(crate) fn wrap(angle: f64) -> f64 {
     firmware::mechanics::math::wrap(angle as f32).into()
 }
 
 /// Velocities of frames 1 to 4 in their own axes.
-pub fn link_velocities(q: &Vector4<f64>, qd: &Vector4<f64>) -> [Twist; 4] {
+pub(crate) fn link_velocities(q: &Vector4<f64>, qd: &Vector4<f64>) -> [Twist; 4] {
     let frames = kinematics::link_frames(GEOMETRY, &trig(q), q.z as f32);
     propagate(&frames, &f32s(qd)).map(|v| Twist {
         angular: v.angular.cast(),
@@ -163,13 +163,13 @@ pub fn link_velocities(q: &Vector4<f64>, qd: &Vector4<f64>) -> [Twist; 4] {
 }
 
 /// Linear and angular velocity of the flange in the base frame, by the Jacobian.
-pub fn flange_velocity(q: &Vector4<f64>, qd: &Vector4<f64>) -> (Vector3<f64>, Vector3<f64>) {
+pub(crate) fn flange_velocity(q: &Vector4<f64>, qd: &Vector4<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let v: Vector4<f64> = jacobian_at(q).task_velocity(&f32s(qd)).cast();
     (v.xyz(), Vector3::z() * v.w)
 }
 
 /// The payload of the `payload` column of the dynamics tables.
-pub fn payload(label: &str) -> Payload {
+pub(crate) fn payload(label: &str) -> Payload {
     match label {
         "none" => Payload::NONE,
         "p10" => Payload {
@@ -182,16 +182,16 @@ pub fn payload(label: &str) -> Payload {
 }
 
 /// The closed-form dynamics of the arm with a payload.
-pub struct Dynamics(Lagrange);
+pub(crate) struct Dynamics(Lagrange);
 
 impl Dynamics {
     /// The arm with the payload of a table.
-    pub fn new(label: &str) -> Self {
+    pub(crate) fn new(label: &str) -> Self {
         Self(Lagrange::new(&IRB_930, &payload(label)))
     }
 
     /// The bare arm under another gravity.
-    pub fn with_gravity(gravity: f64) -> Self {
+    pub(crate) fn with_gravity(gravity: f64) -> Self {
         let arm = ArmModel {
             gravity: gravity as f32,
             ..IRB_930
@@ -200,7 +200,7 @@ impl Dynamics {
     }
 
     /// The bare arm with both arm lengths multiplied.
-    pub fn stretched(factor: f32) -> Self {
+    pub(crate) fn stretched(factor: f32) -> Self {
         let geometry = Geometry {
             a1: factor * GEOMETRY.a1,
             a2: factor * GEOMETRY.a2,
@@ -214,29 +214,29 @@ impl Dynamics {
     }
 
     /// M(q).
-    pub fn mass_matrix(&self, q: &Vector4<f64>) -> Matrix4<f64> {
+    pub(crate) fn mass_matrix(&self, q: &Vector4<f64>) -> Matrix4<f64> {
         self.0.mass_matrix(&trig(q)).cast()
     }
 
     /// C(q, qd) qd.
-    pub fn bias(&self, q: &Vector4<f64>, qd: &Vector4<f64>) -> Vector4<f64> {
+    pub(crate) fn bias(&self, q: &Vector4<f64>, qd: &Vector4<f64>) -> Vector4<f64> {
         self.0.bias(&trig(q), &f32s(qd)).cast()
     }
 
     /// g.
-    pub fn gravity(&self) -> Vector4<f64> {
+    pub(crate) fn gravity(&self) -> Vector4<f64> {
         self.0.gravity().cast()
     }
 
     /// M qdd + C qd + g.
-    pub fn inverse(&self, state: &State) -> Vector4<f64> {
+    pub(crate) fn inverse(&self, state: &State) -> Vector4<f64> {
         let State { q, qd, qdd } = state;
         self.0.inverse(&trig(q), &f32s(qd), &f32s(qdd)).cast()
     }
 }
 
 /// M qdd + C qd + g by recursive Newton-Euler.
-pub fn newton_euler(label: &str, state: &State) -> Vector4<f64> {
+pub(crate) fn newton_euler(label: &str, state: &State) -> Vector4<f64> {
     let State { q, qd, qdd } = state;
     newton_euler::inverse(&IRB_930, &payload(label), &f32s(q), &f32s(qd), &f32s(qdd)).cast()
 }
@@ -270,23 +270,23 @@ fn magnitudes(arm: &Arm, state: &State) -> Vector4<f64> {
 
 /// Error of the closed-form torques: 32 u of the magnitudes by the controller's own account for exact
 /// inputs, 9.5 u for angles of up to 2.5 + 7.0 rad rounded, 3 u for rounded rates and accelerations.
-pub fn torque_bounds(arm: &Arm, state: &State) -> Vector4<f64> {
+pub(crate) fn torque_bounds(arm: &Arm, state: &State) -> Vector4<f64> {
     magnitudes(arm, state) * (48.0 * U32)
 }
 
 /// The largest of the four.
-pub fn torque_bound(arm: &Arm, state: &State) -> f64 {
+pub(crate) fn torque_bound(arm: &Arm, state: &State) -> f64 {
     largest(&torque_bounds(arm, state))
 }
 
 /// The same, largest over the rows with one payload.
-pub fn torque_bound_over(arm: &Arm, table: &Table, label: &str) -> f64 {
+pub(crate) fn torque_bound_over(arm: &Arm, table: &Table, label: &str) -> f64 {
     let rows = table.rows_where("payload", label);
     bound_over(rows, |row| torque_bound(arm, &State::of(&row)))
 }
 
 /// The same of the wrist alone, largest over the rows with one payload.
-pub fn wrist_bound(arm: &Arm, table: &Table, label: &str) -> f64 {
+pub(crate) fn wrist_bound(arm: &Arm, table: &Table, label: &str) -> f64 {
     let rows = table.rows_where("payload", label);
     48.0 * U32 * bound_over(rows, |row| magnitudes(arm, &State::of(&row)).w)
 }
@@ -294,7 +294,7 @@ pub fn wrist_bound(arm: &Arm, table: &Table, label: &str) -> f64 {
 /// Sum of magnitudes that goes through the Newton-Euler recursion: for every link its inertial force on the whole lever
 /// back to the base, with distances added up where the recursion goes out to the far end of a link and back to its centre of
 /// mass.
-pub fn recursion_scale(arm: &Arm, state: &State) -> f64 {
+pub(crate) fn recursion_scale(arm: &Arm, state: &State) -> f64 {
     let (qd, qdd) = (state.qd.abs(), state.qdd.abs());
     let turning = |joints: usize| {
         let (w, alpha) = if joints == 1 {
@@ -319,14 +319,14 @@ pub fn recursion_scale(arm: &Arm, state: &State) -> f64 {
 }
 
 /// What rotors and friction add to the joint efforts.
-pub fn drive_efforts(state: &State) -> Vector4<f64> {
+pub(crate) fn drive_efforts(state: &State) -> Vector4<f64> {
     let drive = Drive::new(&IRB_930.drive);
     let efforts = drive.rotor_inertia() * f32s(&state.qdd) + drive.friction(&f32s(&state.qd));
     efforts.cast()
 }
 
 /// Error of those: 8 u of inertial and viscous efforts, and the 1.5e-6 of the controller's tanh of Coulomb friction.
-pub fn drive_bound(state: &State) -> f64 {
+pub(crate) fn drive_bound(state: &State) -> f64 {
     let drive = Drive::new(&IRB_930.drive);
     let inertia: Matrix4<f64> = drive.rotor_inertia().cast();
     let viscous: Vector4<f64> = IRB_930.drive.viscous.cast();

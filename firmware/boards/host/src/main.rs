@@ -22,7 +22,7 @@ use crate::shell::Shell;
 
 /// Controller of a SCARA drive cabinet on a CAN bus. Waits for the drives, follows the operator, ends with Ctrl-C.
 #[derive(Parser)]
-#[command(name = "controller", version)]
+#[command(name = "controller", version = env!("VERSION_AND_COMMIT"))]
 struct Args {
     /// The bus: socketcan:INTERFACE, slcan:TERMINAL or slcan:tcp:HOST:PORT.
     #[arg(long, value_name = "BUS")]

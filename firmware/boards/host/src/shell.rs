@@ -21,7 +21,7 @@ const SILENCE: Duration = Duration::from_secs(1);
 
 /// Why the controller ended.
 #[derive(Debug, thiserror::Error)]
-pub enum ShellError {
+pub(crate) enum ShellError {
     /// Another controller sends with our identifiers.
     #[error(
         "another controller is on {bus}: {name} (identifier {id:#05x}) was heard, which only a controller sends; \
@@ -47,7 +47,7 @@ struct Counts {
     late: u64,
 }
 
-pub struct Shell {
+pub(crate) struct Shell {
     link: Link,
     bus: String,
     config: Config,
@@ -62,7 +62,7 @@ pub struct Shell {
 }
 
 impl Shell {
-    pub fn new(link: Link, bus: String, config: Config, clock: Clock) -> Self {
+    pub(crate) fn new(link: Link, bus: String, config: Config, clock: Clock) -> Self {
         let deadline =
             matches!(clock, Clock::RealTime { .. }).then(|| config.period.duration().into());
         Self {
@@ -79,7 +79,7 @@ impl Shell {
     }
 
     /// Controls until `stop` is set.
-    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), ShellError> {
+    pub(crate) fn run(&mut self, stop: &AtomicBool) -> Result<(), ShellError> {
         self.listen(stop)?;
         self.poll(None);
         eprintln!("controller: waiting for the drives on {}", self.bus);

@@ -26,12 +26,12 @@ use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
 use protocol::time::Instant;
 
-pub use host::End;
+pub(crate) use host::End;
 use host::File;
 use pins::Pins;
 
 /// What an image adds to the board: each has its own at its root.
-pub trait Image {
+pub(crate) trait Image {
     /// Measures the phases of a call of the node.
     type Meter: Probe + Default + Into<Measured>;
 
@@ -145,7 +145,7 @@ fn poll<I: Image>(
 }
 
 /// Timer ticks since SysTick stood at `before`.
-pub fn ticks_since(before: u32) -> u32 {
+pub(crate) fn ticks_since(before: u32) -> u32 {
     before.wrapping_sub(SYST::get_current()) & SYST_MAX
 }
 

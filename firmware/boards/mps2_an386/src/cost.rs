@@ -17,7 +17,7 @@ mod metered {
 
     use crate::board;
 
-    pub struct Image;
+    pub(crate) struct Image;
 
     impl board::Image for Image {
         type Meter = Meter;

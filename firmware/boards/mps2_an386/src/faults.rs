@@ -19,7 +19,7 @@ mod planted {
 
     use crate::board::{self, End};
 
-    pub struct Image;
+    pub(crate) struct Image;
 
     impl board::Image for Image {
         type Meter = ();

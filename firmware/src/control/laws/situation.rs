@@ -25,14 +25,15 @@ pub struct Situation<'a> {
     pub nominal_inertia: &'a Vector4<f32>,
 }
 
-/// Motion in joint space.
+/// Motion in joint space: shoulder, elbow, lift (positive down), wrist in rad, rad, m, rad and their derivatives in time;
+/// efforts in N m, N m, N, N m.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion<'a> {
     /// Measured joint positions.
     pub q: Vector4<f32>,
     /// Measured joint velocities: means over the last sample, so half a sample old.
     pub qd: Vector4<f32>,
-    /// Measured joint torques, means over the last sample.
+    /// Measured efforts, means over the last sample: what the motors gave, at the joints, friction included.
     pub torque: Vector4<f32>,
     /// Reference at the sampling instant.
     pub reference: &'a Reference,
@@ -44,7 +45,7 @@ pub struct Motion<'a> {
     pub ahead_qdd: Vector4<f32>,
     /// Sampling period, s.
     pub period: f32,
-    /// What the limits cut off the torques of the last sample, 0 where nothing.
+    /// What the limits cut off the efforts of the last sample; 0 where nothing was cut.
     pub excess: Vector4<f32>,
 }
 
@@ -65,7 +66,7 @@ impl Motion<'_> {
     }
 }
 
-/// Where the tool is not, and how fast it does not move: mu = (x, y, z, yaw).
+/// Task-space error and its rate, reference minus measured: mu = (x, y, z, yaw) of the flange in frame 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Task {
     /// Jacobian at the reference.
@@ -74,7 +75,7 @@ pub struct Task {
     pub actual: Jacobian,
     /// mu_d - mu: m, m, m, rad (wrapped).
     pub position: Vector4<f32>,
-    /// mu_d' - mu', means over the last sample.
+    /// mu_d' - mu': m/s, m/s, m/s, rad/s, means over the last sample.
     pub velocity: Vector4<f32>,
 }
 

@@ -132,7 +132,7 @@ impl Drive {
     /// Friction as [`Drive::friction`], with Coulomb friction smoothed over the speeds `eps`, all greater than zero.
     ///
     /// A controller that compensates friction at the *measured* speed wants this wider than the friction itself: over a narrow step it
-    /// would turn the noise of the measurement into chatter.
+    /// would turn the noise of the measurement into chatter. Not on the control path: the laws compensate at the planned speed.
     #[must_use]
     pub fn friction_at(&self, qd: &Vector4<f32>, eps: &Vector4<f32>) -> Vector4<f32> {
         let step = qd.component_div(eps).map(tanh);
@@ -156,6 +156,8 @@ impl Drive {
     }
 
     /// Encoder readings nearest to motor angles `phi` (rad); the ends of the range for angles beyond it, 0 for NaN.
+    ///
+    /// Not on the control path: for drives in tests, the inverse of [`Drive::motor_angle_of_counts`].
     #[must_use]
     pub fn counts_of_motor_angle(&self, phi: &Vector4<f32>) -> [i32; 4] {
         let nearest = |angle: f32| {

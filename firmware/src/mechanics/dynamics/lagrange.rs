@@ -167,6 +167,8 @@ impl Lagrange {
     }
 
     /// Coriolis matrix C of Christoffel symbols, for which `M' - 2 C` is skew-symmetric.
+    ///
+    /// Paper function; not on the control path.
     #[must_use]
     pub fn coriolis(&self, trig: &Trig, qd: &Vector4<f32>) -> Matrix4<f32> {
         let Couplings { d12, d14, d24, .. } = self.couplings(trig);
@@ -245,6 +247,8 @@ impl Lagrange {
     /// Forward dynamics: joint accelerations under the efforts `tau` (rad/s^2, lift m/s^2).
     ///
     /// The planar block is eliminated as `L D L^T` without pivoting, which is backward stable because it is positive definite.
+    ///
+    /// Paper function; not on the control path.
     #[must_use]
     pub fn forward(&self, trig: &Trig, qd: &Vector4<f32>, tau: &Vector4<f32>) -> Vector4<f32> {
         let couplings = self.couplings(trig);

@@ -46,7 +46,7 @@ pub fn finish_on_signal() -> Result<(), String> {
 }
 
 /// A trace that is read from front to end, with its progress on standard error.
-pub struct Source {
+pub(super) struct Source {
     name: String,
     reader: Reader<BufReader<Box<dyn Read>>>,
     selection: Selection,
@@ -198,7 +198,7 @@ impl Source {
     }
 
     /// File and line read last.
-    pub fn place(&self) -> String {
+    pub(super) fn place(&self) -> String {
         format!("{}:{}", self.name, self.reader.line())
     }
 

@@ -24,7 +24,7 @@ pub struct Asc<W> {
 }
 
 impl<W: Write> Asc<W> {
-    pub fn new(sink: W) -> Self {
+    pub(super) fn new(sink: W) -> Self {
         Self {
             sink,
             interfaces: Interfaces::default(),
@@ -32,7 +32,7 @@ impl<W: Write> Asc<W> {
         }
     }
 
-    pub fn record(&mut self, record: &Record) -> io::Result<()> {
+    pub(super) fn record(&mut self, record: &Record) -> io::Result<()> {
         let start_us = match self.start_us {
             Some(start_us) => start_us,
             None => {
@@ -52,7 +52,7 @@ impl<W: Write> Asc<W> {
         writeln!(self.sink, "{time:>11} {content}")
     }
 
-    pub fn finish(mut self) -> io::Result<W> {
+    pub(super) fn finish(mut self) -> io::Result<W> {
         if self.start_us.is_none() {
             self.header(0)?;
         }

@@ -25,14 +25,14 @@ pub(crate) const EXTENDED_FLAG: u32 = 0x8000_0000;
 pub(crate) const REMOTE_FLAG: u32 = 0x4000_0000;
 
 /// A pcapng file of one section. Timestamps count microseconds, the resolution of the format unless told otherwise.
-pub struct Pcapng<W> {
+pub(super) struct Pcapng<W> {
     pub(super) sink: W,
     interfaces: Interfaces,
     block: Vec<u8>,
 }
 
 impl<W: Write> Pcapng<W> {
-    pub fn new(sink: W) -> io::Result<Self> {
+    pub(super) fn new(sink: W) -> io::Result<Self> {
         let mut file = Self {
             sink,
             interfaces: Interfaces::default(),
@@ -47,7 +47,7 @@ impl<W: Write> Pcapng<W> {
         Ok(file)
     }
 
-    pub fn record(&mut self, record: &Record) -> io::Result<()> {
+    pub(super) fn record(&mut self, record: &Record) -> io::Result<()> {
         let (number, new) = self.interfaces.number(record.interface);
         if new {
             self.describe(&record.interface)?;
@@ -83,7 +83,7 @@ impl<W: Write> Pcapng<W> {
         self.end_block(ENHANCED_PACKET)
     }
 
-    pub fn finish(self) -> W {
+    pub(super) fn finish(self) -> W {
         self.sink
     }
 

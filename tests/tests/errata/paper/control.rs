@@ -3,12 +3,12 @@
 use nalgebra::{Matrix4, Vector4};
 
 /// Kinematic control, joint space: `qd = qd_d + lambda qdd`.
-pub fn kinematic_joint(qd_d: f64, lambda: f64, qdd: f64) -> f64 {
+pub(crate) fn kinematic_joint(qd_d: f64, lambda: f64, qdd: f64) -> f64 {
     qd_d + lambda * qdd
 }
 
 /// Kinematic control, task space: `qd = J^-1 (mud_d + r mudd)`.
-pub fn kinematic_task(
+pub(crate) fn kinematic_task(
     j_inverse: &Matrix4<f64>,
     mud_d: &Vector4<f64>,
     r: f64,
@@ -18,10 +18,10 @@ pub fn kinematic_task(
 }
 
 /// A state or reference: position and velocity.
-pub type Motion = (Vector4<f64>, Vector4<f64>);
+pub(crate) type Motion = (Vector4<f64>, Vector4<f64>);
 
 /// Dynamic control, joint space: `tau = kp (q_d - q) + kd (qd_d - qd) + g(q)`.
-pub fn pd_gravity(
+pub(crate) fn pd_gravity(
     kp: &Matrix4<f64>,
     kd: &Matrix4<f64>,
     (q_d, qd_d): Motion,
@@ -32,7 +32,7 @@ pub fn pd_gravity(
 }
 
 /// Eq. 49, the bracket: `mudd_d - Jdot(q_d) qd_d + kp (mu_d - mu) + kd (mud_d - mud)`.
-pub fn eq_49_bracket(
+pub(crate) fn eq_49_bracket(
     mudd_d: &Vector4<f64>,
     jdot_qd_desired: &Vector4<f64>,
     (kp, kd): (f64, f64),

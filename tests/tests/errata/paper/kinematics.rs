@@ -6,7 +6,7 @@ use crate::arm::Arm;
 
 /// One row of Table 1: `a`, `alpha`, `d`, `theta` (m, rad).
 #[derive(Clone, Copy)]
-pub struct DhRow {
+pub(crate) struct DhRow {
     pub a: f64,
     pub alpha: f64,
     pub d: f64,
@@ -14,7 +14,7 @@ pub struct DhRow {
 }
 
 /// Table 1.
-pub fn table_1(arm: &Arm, q: &Vector4<f64>) -> [DhRow; 4] {
+pub(crate) fn table_1(arm: &Arm, q: &Vector4<f64>) -> [DhRow; 4] {
     let row = |a, alpha: f64, d, theta| DhRow {
         a,
         alpha: alpha.to_radians(),
@@ -30,7 +30,7 @@ pub fn table_1(arm: &Arm, q: &Vector4<f64>) -> [DhRow; 4] {
 }
 
 /// Eq. 2, the link transform of standard (distal) Denavit-Hartenberg.
-pub fn eq_2(row: &DhRow) -> Matrix4<f64> {
+pub(crate) fn eq_2(row: &DhRow) -> Matrix4<f64> {
     let (s, c) = row.theta.sin_cos();
     let (sa, ca) = row.alpha.sin_cos();
     Matrix4::new(
@@ -55,7 +55,7 @@ pub fn eq_2(row: &DhRow) -> Matrix4<f64> {
 
 /// The link transform as the sentence before eq. 1 words it: twist `alpha_i` and length `a_i` about and along `x_{i-1}`,
 /// then angle and offset about and along z.
-pub fn text_before_eq_1(row: &DhRow) -> Matrix4<f64> {
+pub(crate) fn text_before_eq_1(row: &DhRow) -> Matrix4<f64> {
     let twist = eq_2(&DhRow {
         d: 0.0,
         theta: 0.0,
@@ -70,7 +70,7 @@ pub fn text_before_eq_1(row: &DhRow) -> Matrix4<f64> {
 }
 
 /// Eq. 4, T_2^1, with the printed +1 in row 3, column 3.
-pub fn eq_4(arm: &Arm, theta2: f64) -> Matrix4<f64> {
+pub(crate) fn eq_4(arm: &Arm, theta2: f64) -> Matrix4<f64> {
     let (s2, c2) = theta2.sin_cos();
     Matrix4::new(
         c2,
@@ -93,12 +93,12 @@ pub fn eq_4(arm: &Arm, theta2: f64) -> Matrix4<f64> {
 }
 
 /// Eq. 1: the chain of four transforms.
-pub fn eq_1(links: [Matrix4<f64>; 4]) -> Matrix4<f64> {
+pub(crate) fn eq_1(links: [Matrix4<f64>; 4]) -> Matrix4<f64> {
     links.into_iter().product()
 }
 
 /// Eq. 8-19: rotation [n s a] and position o of the flange.
-pub fn eq_8_to_19(arm: &Arm, q: &Vector4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+pub(crate) fn eq_8_to_19(arm: &Arm, q: &Vector4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
     let (s1, c1) = q.x.sin_cos();
     let (s12, c12) = (q.x + q.y).sin_cos();
     let (s4, c4) = q.w.sin_cos();
@@ -123,63 +123,67 @@ pub fn eq_8_to_19(arm: &Arm, q: &Vector4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
 
 /// `atan2` with the arguments in the order in which a programming language takes them: `atan2(first, second)` of the
 /// paper typed as it stands, so the first is the sine side.
-pub fn atan2_typed(first: f64, second: f64) -> f64 {
+pub(crate) fn atan2_typed(first: f64, second: f64) -> f64 {
     first.atan2(second)
 }
 
 /// `atan2` with the arguments as the paper (after Spong) means them: cosine side first.
-pub fn atan2_meant(first: f64, second: f64) -> f64 {
+pub(crate) fn atan2_meant(first: f64, second: f64) -> f64 {
     second.atan2(first)
 }
 
 /// A reading of the paper's `a tan 2`.
-pub type Atan2 = fn(f64, f64) -> f64;
+pub(crate) type Atan2 = fn(f64, f64) -> f64;
 
 /// Inverse kinematics: the yaw `alpha = atan2(r11, r12)`.
-pub fn ik_alpha(rotation: &Matrix3<f64>, atan2: Atan2) -> f64 {
+pub(crate) fn ik_alpha(rotation: &Matrix3<f64>, atan2: Atan2) -> f64 {
     atan2(rotation[(0, 0)], rotation[(0, 1)])
 }
 
 /// Inverse kinematics: `c2 = (ox^2 + oy^2 - a1^2 - a2^2) / (2 a1 a2)`.
-pub fn ik_c2(arm: &Arm, o: &Vector2<f64>) -> f64 {
+pub(crate) fn ik_c2(arm: &Arm, o: &Vector2<f64>) -> f64 {
     (o.norm_squared() - arm.a1.powi(2) - arm.a2.powi(2)) / (2.0 * arm.a1 * arm.a2)
 }
 
 /// Inverse kinematics: `theta2 = atan2(c2, +-sqrt(1 - c2))`.
-pub fn ik_theta2(c2: f64, sign: f64, atan2: Atan2) -> f64 {
+pub(crate) fn ik_theta2(c2: f64, sign: f64, atan2: Atan2) -> f64 {
     atan2(c2, sign * (1.0 - c2).sqrt())
 }
 
 /// Inverse kinematics: `theta1 = atan2(ox, oy) - atan2(a1 + a2 c2, a2 s2)`.
-pub fn ik_theta1(arm: &Arm, o: &Vector2<f64>, theta2: f64, atan2: Atan2) -> f64 {
+pub(crate) fn ik_theta1(arm: &Arm, o: &Vector2<f64>, theta2: f64, atan2: Atan2) -> f64 {
     let (s2, c2) = theta2.sin_cos();
     atan2(o.x, o.y) - atan2(arm.a1 + arm.a2 * c2, arm.a2 * s2)
 }
 
 /// Inverse kinematics: `theta4 = theta1 + theta2 - alpha`, with no word on wrapping.
-pub fn ik_theta4(theta1: f64, theta2: f64, alpha: f64) -> f64 {
+pub(crate) fn ik_theta4(theta1: f64, theta2: f64, alpha: f64) -> f64 {
     theta1 + theta2 - alpha
 }
 
 /// Inverse kinematics: `d3 = oz + d4`.
-pub fn ik_d3(arm: &Arm, oz: f64) -> f64 {
+pub(crate) fn ik_d3(arm: &Arm, oz: f64) -> f64 {
     oz + arm.d4
 }
 
 /// The origin o_4 listed with eq. 26: z = d3 - d4.
-pub fn eq_26_o4(arm: &Arm, q: &Vector4<f64>) -> Vector3<f64> {
+pub(crate) fn eq_26_o4(arm: &Arm, q: &Vector4<f64>) -> Vector3<f64> {
     let (_, o) = eq_8_to_19(arm, q);
     Vector3::new(o.x, o.y, q.z - arm.d4)
 }
 
 /// Eq. 24: the Jacobian column of a revolute joint with axis `z` through `origin`, for a flange at `flange`.
-pub fn eq_24(z: &Vector3<f64>, origin: &Vector3<f64>, flange: &Vector3<f64>) -> SMatrix<f64, 6, 1> {
+pub(crate) fn eq_24(
+    z: &Vector3<f64>,
+    origin: &Vector3<f64>,
+    flange: &Vector3<f64>,
+) -> SMatrix<f64, 6, 1> {
     let linear = z.cross(&(flange - origin));
     SMatrix::<f64, 6, 1>::new(linear.x, linear.y, linear.z, z.x, z.y, z.z)
 }
 
 /// Eq. 27: the 6x4 Jacobian, rows vx vy vz wx wy wz.
-pub fn eq_27(arm: &Arm, q: &Vector4<f64>) -> SMatrix<f64, 6, 4> {
+pub(crate) fn eq_27(arm: &Arm, q: &Vector4<f64>) -> SMatrix<f64, 6, 4> {
     let (s1, c1) = q.x.sin_cos();
     let (s12, c12) = (q.x + q.y).sin_cos();
     let (x1, y1) = (arm.a1 * c1, arm.a1 * s1);
@@ -213,7 +217,7 @@ pub fn eq_27(arm: &Arm, q: &Vector4<f64>) -> SMatrix<f64, 6, 4> {
 }
 
 /// Eq. 29: the block J_11 that is to decide on singularities.
-pub fn eq_29(arm: &Arm, q: &Vector4<f64>) -> Matrix3<f64> {
+pub(crate) fn eq_29(arm: &Arm, q: &Vector4<f64>) -> Matrix3<f64> {
     let (s1, c1) = q.x.sin_cos();
     let (s12, c12) = (q.x + q.y).sin_cos();
     Matrix3::new(
@@ -230,6 +234,6 @@ pub fn eq_29(arm: &Arm, q: &Vector4<f64>) -> Matrix3<f64> {
 }
 
 /// The rank condition after eq. 29, `alpha1 alpha4 - alpha2 alpha3`, of four numbers that the paper never defines.
-pub fn rank_condition(alpha: [f64; 4]) -> f64 {
+pub(crate) fn rank_condition(alpha: [f64; 4]) -> f64 {
     alpha[0] * alpha[3] - alpha[1] * alpha[2]
 }

@@ -4,14 +4,14 @@ use nalgebra::{Vector2, Vector4};
 
 /// What eq. 40-43 take as given. `m` and `a` are the masses and lengths of links 1 to 3: the equations know no link 4,
 /// no inertia and no payload, but a length `a3` that Table 1 sets to zero.
-pub struct Given {
+pub(crate) struct Given {
     pub m: [f64; 3],
     pub a: [f64; 3],
     pub g: f64,
 }
 
 /// Kinetic energy: `sum m_i (xd_i^2 + yd_i^2) / 2`, J.
-pub fn kinetic_energy(bodies: impl IntoIterator<Item = (f64, Vector2<f64>)>) -> f64 {
+pub(crate) fn kinetic_energy(bodies: impl IntoIterator<Item = (f64, Vector2<f64>)>) -> f64 {
     bodies
         .into_iter()
         .map(|(m, v)| 0.5 * m * v.norm_squared())
@@ -19,13 +19,13 @@ pub fn kinetic_energy(bodies: impl IntoIterator<Item = (f64, Vector2<f64>)>) -> 
 }
 
 /// Potential energy: `sum m_i g_i y_i`, J. `bodies` gives mass and y of each.
-pub fn potential_energy(bodies: impl IntoIterator<Item = (f64, f64)>, g: f64) -> f64 {
+pub(crate) fn potential_energy(bodies: impl IntoIterator<Item = (f64, f64)>, g: f64) -> f64 {
     bodies.into_iter().map(|(m, y)| m * g * y).sum()
 }
 
 /// Eq. 40-43: tau_1 to tau_4. `rate` stands for the theta-dots that occur to the first power and `square` for those that
 /// occur in products; as printed both are the joint velocities.
-pub fn eq_40_to_43(
+pub(crate) fn eq_40_to_43(
     given: &Given,
     q: &Vector4<f64>,
     rate: &Vector2<f64>,
@@ -40,7 +40,12 @@ pub fn eq_40_to_43(
 }
 
 /// Eq. 40: tau_1, in the order of the print.
-pub fn eq_40(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>, square: &Vector2<f64>) -> f64 {
+pub(crate) fn eq_40(
+    given: &Given,
+    q: &Vector4<f64>,
+    rate: &Vector2<f64>,
+    square: &Vector2<f64>,
+) -> f64 {
     let ([m1, m2, m3], [a1, a2, a3], g) = (given.m, given.a, given.g);
     let (c1, c2, c12, s2) = (q.x.cos(), q.y.cos(), (q.x + q.y).cos(), q.y.sin());
     let (v1, v2) = (rate.x, rate.y);
@@ -86,7 +91,7 @@ pub fn eq_40(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>, square: &Vect
 }
 
 /// Eq. 41: tau_2, in the order of the print. It has no product of velocities at all.
-pub fn eq_41(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64 {
+pub(crate) fn eq_41(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64 {
     let ([m1, m2, m3], [a1, a2, a3], g) = (given.m, given.a, given.g);
     let (c1, c2, c12) = (q.x.cos(), q.y.cos(), (q.x + q.y).cos());
     let (v1, v2) = (rate.x, rate.y);
@@ -111,7 +116,7 @@ pub fn eq_41(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64 {
 }
 
 /// Eq. 42: tau_3.
-pub fn eq_42(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64 {
+pub(crate) fn eq_42(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64 {
     let ([_, m2, m3], [a1, a2, a3], g) = (given.m, given.a, given.g);
     let (c2, c12) = (q.y.cos(), (q.x + q.y).cos());
     let (v1, v2) = (rate.x, rate.y);
@@ -123,7 +128,7 @@ pub fn eq_42(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64 {
 }
 
 /// Eq. 43: tau_4. The print breaks off inside the last cosine, "cos(theta_1 + theta"; theta_2 is read for the rest.
-pub fn eq_43(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64 {
+pub(crate) fn eq_43(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64 {
     let ([_, _, m3], [a1, a2, a3], g) = (given.m, given.a, given.g);
     let (c2, c12) = (q.y.cos(), (q.x + q.y).cos());
     let (v1, v2) = (rate.x, rate.y);

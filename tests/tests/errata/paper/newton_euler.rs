@@ -10,7 +10,7 @@ use crate::arm::{Arm, Link, State, rotation, translation};
 
 /// A line of the recursion as printed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Misprint {
+pub(crate) enum Misprint {
     /// Eq. 30: `w' = R w + thd z'`; the axis of the joint is z, not z'.
     AngularVelocity,
     /// No base acceleration: gravity does not occur anywhere in the recursion.
@@ -33,7 +33,7 @@ pub enum Misprint {
 
 impl Misprint {
     /// The recursion as printed.
-    pub const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::AngularVelocity,
         Self::NoGravity,
         Self::Coriolis,
@@ -47,7 +47,7 @@ impl Misprint {
 }
 
 /// A joint of a chain: its DH row and how it moves.
-pub struct Joint {
+pub(crate) struct Joint {
     pub row: DhRow,
     pub prismatic: bool,
     pub rate: f64,
@@ -56,14 +56,14 @@ pub struct Joint {
 
 /// Motion of a frame in its own axes: angular velocity, angular acceleration, acceleration of the origin.
 #[derive(Clone, Copy, Default)]
-pub struct Motion {
+pub(crate) struct Motion {
     pub w: Vector3<f64>,
     pub alpha: Vector3<f64>,
     pub a: Vector3<f64>,
 }
 
 /// One step of the outward pass.
-pub fn outward(joint: &Joint, last: &Motion, misprints: &[Misprint]) -> Motion {
+pub(crate) fn outward(joint: &Joint, last: &Motion, misprints: &[Misprint]) -> Motion {
     let wrong = |m| misprints.contains(&m);
     let link = eq_2(&joint.row);
     let r = rotation(&link).transpose();
@@ -103,7 +103,7 @@ pub fn outward(joint: &Joint, last: &Motion, misprints: &[Misprint]) -> Motion {
 }
 
 /// Joint efforts: torque, torque, force, torque (N m, N).
-pub fn inverse_dynamics(arm: &Arm, state: &State, misprints: &[Misprint]) -> Vector4<f64> {
+pub(crate) fn inverse_dynamics(arm: &Arm, state: &State, misprints: &[Misprint]) -> Vector4<f64> {
     let wrong = |m| misprints.contains(&m);
     let rows = table_1(arm, &state.q);
     let mut motion = Motion::default();

@@ -9,7 +9,7 @@ use crate::arm::{Arm, Twist, rotation, translation};
 ///
 /// Revolute joints: `w' = R w + thd z'` (30) and `v' = R (v + w x P)` (32). Prismatic: `w' = R w` (31) and
 /// `v' = R (v + w x P + dd z)` (33). R turns frame i into frame i+1, P is the origin of frame i+1 in frame i.
-pub fn eq_30_to_33(arm: &Arm, q: &Vector4<f64>, qd: &Vector4<f64>) -> [Twist; 4] {
+pub(crate) fn eq_30_to_33(arm: &Arm, q: &Vector4<f64>, qd: &Vector4<f64>) -> [Twist; 4] {
     let rows = table_1(arm, q);
     let mut last = Twist::default();
     std::array::from_fn(|i| {
@@ -34,7 +34,7 @@ pub fn eq_30_to_33(arm: &Arm, q: &Vector4<f64>, qd: &Vector4<f64>) -> [Twist; 4]
 }
 
 /// Eq. 34, 35: the linear velocities of the frames, each in its own axes.
-pub fn eq_34_35(arm: &Arm, q: &Vector4<f64>, qd: &Vector4<f64>) -> [Vector3<f64>; 4] {
+pub(crate) fn eq_34_35(arm: &Arm, q: &Vector4<f64>, qd: &Vector4<f64>) -> [Vector3<f64>; 4] {
     let (s4, c4) = q.w.sin_cos();
     let v = -arm.a2 * qd.x;
     [
@@ -46,17 +46,17 @@ pub fn eq_34_35(arm: &Arm, q: &Vector4<f64>, qd: &Vector4<f64>) -> [Vector3<f64>
 }
 
 /// Eq. 36, 37: the angular velocities of the frames, each in its own axes.
-pub fn eq_36_37(qd: &Vector4<f64>) -> [Vector3<f64>; 4] {
+pub(crate) fn eq_36_37(qd: &Vector4<f64>) -> [Vector3<f64>; 4] {
     [qd.x, qd.y - qd.x, qd.y - qd.x, qd.y - qd.x].map(|rate| Vector3::z() * rate)
 }
 
 /// Eq. 38: the angular velocity of the flange in the base frame.
-pub fn eq_38(qd: &Vector4<f64>) -> Vector3<f64> {
+pub(crate) fn eq_38(qd: &Vector4<f64>) -> Vector3<f64> {
     Vector3::z() * (qd.x - qd.y)
 }
 
 /// Eq. 39: the linear velocity of the flange in the base frame.
-pub fn eq_39(arm: &Arm, q: &Vector4<f64>, qd: &Vector4<f64>) -> Vector3<f64> {
+pub(crate) fn eq_39(arm: &Arm, q: &Vector4<f64>, qd: &Vector4<f64>) -> Vector3<f64> {
     let (s12, c12) = (q.x + q.y).sin_cos();
     Vector3::new(-arm.a2 * qd.x * s12, -arm.a2 * qd.x * c12, -qd.z)
 }

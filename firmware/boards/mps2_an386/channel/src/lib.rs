@@ -10,6 +10,10 @@
 //!   frame, after the frames that answer it. `O` opens the bus; `C` closes it, and the board's last [`Reply`] says how
 //!   many bytes its receiver has lost.
 //!
+//! A Feedback frame on its way to the board is written into a [`Request`] by `plant-sim`, read by the board's loop, handed
+//! to the node, and answered by a [`Reply`] with the Command in it; over the UART it is a line that interrupts put into the
+//! [`ring`]. `plant-sim` (qemu, crash, cost) is one caller, the images of mps2_an386 are the other.
+//!
 //! Every record from the host has a fixed length. Numbers are little-endian, frames in records are in the layout of
 //! Linux's `struct canfd_frame`.
 

@@ -8,23 +8,23 @@ use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
 use cortex_m_semihosting::{nr, syscall};
 
 /// The host has gone, or speaks another language.
-pub struct End;
+pub(crate) struct End;
 
 /// Modes of `SYS_OPEN`: those of `fopen`, numbered.
 const READ_BINARY: usize = 1;
 const WRITE_BINARY: usize = 5;
 
 /// An open file of the host. Closed by the host when the emulation ends.
-pub struct File(usize);
+pub(crate) struct File(usize);
 
 impl File {
     /// Opens a file for reading; blocks on a FIFO until it has a writer.
-    pub fn open(path: &CStr) -> Result<Self, End> {
+    pub(crate) fn open(path: &CStr) -> Result<Self, End> {
         Self::with_mode(path, READ_BINARY)
     }
 
     /// Opens a file for writing; blocks on a FIFO until it has a reader.
-    pub fn create(path: &CStr) -> Result<Self, End> {
+    pub(crate) fn create(path: &CStr) -> Result<Self, End> {
         Self::with_mode(path, WRITE_BINARY)
     }
 
@@ -38,7 +38,7 @@ impl File {
     }
 
     /// Fills `buffer`; blocks until that many bytes have come.
-    pub fn read(&self, buffer: &mut [u8]) -> Result<(), End> {
+    pub(crate) fn read(&self, buffer: &mut [u8]) -> Result<(), End> {
         let mut rest = buffer;
         while !rest.is_empty() {
             let block = [self.0, rest.as_mut_ptr() as usize, rest.len()];
@@ -54,7 +54,7 @@ impl File {
     }
 
     /// Writes all of `bytes`.
-    pub fn write(&self, bytes: &[u8]) -> Result<(), End> {
+    pub(crate) fn write(&self, bytes: &[u8]) -> Result<(), End> {
         let block = [self.0, bytes.as_ptr() as usize, bytes.len()];
         // SAFETY: SYS_WRITE reads `len` bytes from the address, which is that of `bytes`.
         match unsafe { syscall(nr::WRITE, &block) } {
@@ -65,7 +65,7 @@ impl File {
 }
 
 /// Ends the emulation; the emulator's exit status is 0 or 1.
-pub fn exit(result: Result<(), End>) -> ! {
+pub(crate) fn exit(result: Result<(), End>) -> ! {
     debug::exit(match result {
         Ok(()) => EXIT_SUCCESS,
         Err(End) => EXIT_FAILURE,

@@ -9,7 +9,7 @@ use defmt::{Encoder, Logger};
 use super::uart::LOG;
 
 /// Time of the controller, ms.
-pub static NOW: AtomicU32 = AtomicU32::new(0);
+pub(crate) static NOW: AtomicU32 = AtomicU32::new(0);
 
 defmt::timestamp!("{=u32:ms}", NOW.load(Ordering::Relaxed));
 

@@ -10,10 +10,10 @@ use firmware::cabinet::pins::{Cabinet, TORQUE_OFF};
 const LEDS: *mut u32 = 0x4002_F004 as *mut u32;
 
 /// The cabinet of this board.
-pub type Pins = Cabinet<Led, Led, Led, Led, Closed>;
+pub(crate) type Pins = Cabinet<Led, Led, Led, Led, Closed>;
 
 /// The pins, all low. Call it once.
-pub fn cabinet() -> Pins {
+pub(crate) fn cabinet() -> Pins {
     write(0);
     Cabinet {
         brake: Led(1 << 0),
@@ -33,7 +33,7 @@ fn board_torque_off() -> [u8; 2] {
 }
 
 /// One output.
-pub struct Led(u32);
+pub(crate) struct Led(u32);
 
 impl ErrorType for Led {
     type Error = Infallible;
@@ -52,7 +52,7 @@ impl OutputPin for Led {
 }
 
 /// The emergency-stop chain: QEMU models no button of the board, so that it is always closed.
-pub struct Closed;
+pub(crate) struct Closed;
 
 impl ErrorType for Closed {
     type Error = Infallible;

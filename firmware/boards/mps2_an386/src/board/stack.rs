@@ -11,7 +11,7 @@ unsafe extern "C" {
 }
 
 /// Most bytes of stack used since the start.
-pub fn used() -> usize {
+pub(crate) fn used() -> usize {
     let top = &raw const _stack_start;
     let mut lowest = &raw const _stack_end;
     // SAFETY: the linker script puts the stack between these symbols, aligned to words. Words of it are read only, and

@@ -7,12 +7,12 @@ use core::ptr;
 use channel::ring::Ring;
 
 /// UART 0, which carries frames.
-pub const FRAMES: Uart = Uart(0x4000_4000);
+pub(crate) const FRAMES: Uart = Uart(0x4000_4000);
 /// UART 1, which carries the log. It is only sent to.
-pub const LOG: Uart = Uart(0x4000_5000);
+pub(crate) const LOG: Uart = Uart(0x4000_5000);
 
 /// Interrupt that a byte received by UART 0 raises.
-pub const RECEIVE_IRQ: i16 = 0;
+pub(crate) const RECEIVE_IRQ: i16 = 0;
 
 // Registers, by their distance from the first.
 const DATA: usize = 0x0;
@@ -33,10 +33,10 @@ const INT_RX: u32 = 1 << 1;
 const FASTEST: u32 = 16;
 
 /// Bytes that UART 0 has received and nobody has taken yet.
-pub static RECEIVED: Ring = Ring::new();
+pub(crate) static RECEIVED: Ring = Ring::new();
 
 /// A UART, by its address. Only the two above exist.
-pub struct Uart(usize);
+pub(crate) struct Uart(usize);
 
 impl Uart {
     fn read(&self, register: usize) -> u32 {
@@ -50,13 +50,13 @@ impl Uart {
     }
 
     /// Starts the transmitter.
-    pub fn start(&self) {
+    pub(crate) fn start(&self) {
         self.write(BAUDDIV, FASTEST);
         self.write(CTRL, CTRL_TX);
     }
 
     /// Starts receiver and transmitter with the receive interrupt.
-    pub fn start_receiving(&self) {
+    pub(crate) fn start_receiving(&self) {
         self.write(BAUDDIV, FASTEST);
         self.write(CTRL, CTRL_TX | CTRL_RX | CTRL_RX_INTERRUPT);
         // SAFETY: the interrupt has no priority to change and shares nothing but atomics.
@@ -64,7 +64,7 @@ impl Uart {
     }
 
     /// Sends bytes, each as soon as there is room.
-    pub fn send(&self, bytes: &[u8]) {
+    pub(crate) fn send(&self, bytes: &[u8]) {
         for &byte in bytes {
             while self.read(STATE) & STATE_TX_FULL != 0 {}
             self.write(DATA, u32::from(byte));
@@ -73,7 +73,7 @@ impl Uart {
 }
 
 /// The receive interrupt of UART 0. STATE and INTCLEAR clear what is written as 1.
-pub fn receive() {
+pub(crate) fn receive() {
     FRAMES.write(INTCLEAR, INT_RX);
     let state = FRAMES.read(STATE);
     if state & STATE_RX_OVERRUN != 0 {

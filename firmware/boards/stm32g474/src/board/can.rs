@@ -22,9 +22,9 @@ use protocol::messages::{EStop, EStopReason, Message};
 use protocol::table;
 
 /// Queue of frames received.
-pub type Received = RxFdBuf<RECEIVED>;
+pub(crate) type Received = RxFdBuf<RECEIVED>;
 /// Queue of frames to be sent.
-pub type ToSend = TxFdBuf<TO_SEND>;
+pub(crate) type ToSend = TxFdBuf<TO_SEND>;
 
 /// Frames that may wait between interrupt and loop, besides three in the hardware either way.
 const RECEIVED: usize = 16;
@@ -66,7 +66,7 @@ bind_interrupts!(struct Interrupts {
 });
 
 /// The CAN controller with its queues.
-pub struct Can {
+pub(crate) struct Can {
     driver: BufferedCanFd<'static, TO_SEND, RECEIVED>,
     reader: BufferedFdCanReceiver,
     writer: BufferedFdCanSender,
@@ -74,7 +74,7 @@ pub struct Can {
 
 impl Can {
     /// Joins the bus.
-    pub fn start(
+    pub(crate) fn start(
         peripheral: Peri<'static, FDCAN1>,
         rx: Peri<'static, PA11>,
         tx: Peri<'static, PA12>,
@@ -124,7 +124,7 @@ fn compensate_delay() {
 }
 
 /// The node's end of the bus.
-pub struct Port {
+pub(crate) struct Port {
     can: Can,
     /// A frame taken from the queue to see whether there is one.
     next: Option<CanFrame>,
@@ -135,7 +135,7 @@ pub struct Port {
 }
 
 impl Port {
-    pub fn new(can: Can) -> Self {
+    pub(crate) fn new(can: Can) -> Self {
         Self {
             can,
             next: None,
@@ -147,7 +147,7 @@ impl Port {
 
     /// Notes the emergency-stop chain. While it is open the node hears so in every call; the other nodes hear it once,
     /// and from then on by the state.
-    pub fn set_estop(&mut self, pressed: bool) {
+    pub(crate) fn set_estop(&mut self, pressed: bool) {
         if pressed && !self.estop {
             defmt::warn!("emergency-stop chain open");
             if let Some(frame) = estop_frame() {
@@ -159,7 +159,7 @@ impl Port {
     }
 
     /// Whether a frame is waiting.
-    pub fn has_frames(&mut self) -> bool {
+    pub(crate) fn has_frames(&mut self) -> bool {
         // The queue holds frames and, in between, errors of the bus, which the controller deals with by itself.
         while self.next.is_none() {
             match self.can.reader.try_receive() {

@@ -39,7 +39,7 @@ unsafe fn DefaultHandler(_: i16) {
 }
 
 /// How the board has been stopped before this start. Forgets it, so that the next start tells its own reason.
-pub fn last_stop() -> Stop {
+pub(crate) fn last_stop() -> Stop {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|csr| csr.set_rmvf(true));
     let kept = cortex_m4::last_stop();

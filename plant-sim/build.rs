@@ -1,0 +1,74 @@
+//! Version and commit for `--version`, of `plant-sim` and of the controller on a host:
+//! `0.1.0 (abc1234, 2026-11-28)`, with `modified` where the sources are not those of the commit.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What goes into the programs, from the root of the repository.
+const SOURCES: [&str; 5] = [
+    "protocol",
+    "firmware",
+    "plant-sim",
+    "Cargo.toml",
+    "Cargo.lock",
+];
+
+fn main() {
+    let root = root();
+    let version = env!("CARGO_PKG_VERSION");
+    let commit = commit(&root).unwrap_or("unknown commit".into());
+    println!("cargo:rustc-env=VERSION_AND_COMMIT={version} ({commit})");
+    let sources = SOURCES.map(|source| root.join(source));
+    // HEAD moves with a checkout, its log with every commit.
+    let heads = ["HEAD", "logs/HEAD"]
+        .into_iter()
+        .filter_map(|file| git(&root, &["rev-parse", "--git-path", file]))
+        .map(|file| root.join(file));
+    // Cargo takes a file that is not there for one that has changed.
+    for file in sources
+        .into_iter()
+        .chain(heads)
+        .filter(|file| file.exists())
+    {
+        println!("cargo:rerun-if-changed={}", file.display());
+    }
+}
+
+/// The folder that holds the workspace.
+fn root() -> PathBuf {
+    let mut folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    while !folder.join("Cargo.lock").exists() {
+        folder = folder.parent().expect("a package of the workspace");
+    }
+    folder.into()
+}
+
+/// Commit and its date; none without git, or where the sources are no repository or lie inside of another one.
+fn commit(root: &Path) -> Option<String> {
+    let top = git(root, &["rev-parse", "--show-toplevel"])?;
+    if Path::new(&top).canonicalize().ok()? != root.canonicalize().ok()? {
+        return None;
+    }
+    let commit = git(root, &["log", "-1", "--abbrev=7", "--format=%h, %cs"])?;
+    let status = [
+        "--no-optional-locks",
+        "status",
+        "--porcelain",
+        "--untracked-files=no",
+        "--",
+    ];
+    let changes = git(root, &[&status[..], &SOURCES[..]].concat())?;
+    let modified = if changes.is_empty() { "" } else { ", modified" };
+    Some(commit + modified)
+}
+
+fn git(root: &Path, arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git")
+        .arg("-C")
+        .arg(root)
+        .args(arguments)
+        .output()
+        .ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    output.status.success().then(|| text.trim().to_owned())
+}

@@ -1,0 +1,18 @@
+//! Worst-case load of the bus by control rate, as docs/protocol.md shows it.
+
+use protocol::wire::BitTiming;
+use sim::bus::{MAX_LOAD, Overload};
+use sim::rig;
+
+fn main() {
+    println!("| rate Hz | worst-case load % | |");
+    println!("|---|---|---|");
+    for rate in [1000, 2000, 3000, 4000] {
+        let (load, verdict) = match rig::admit(&BitTiming::default(), f64::from(rate)) {
+            Ok(load) => (load, "accepted"),
+            Err(Overload { load }) => (load, "refused"),
+        };
+        assert_eq!(load > MAX_LOAD, verdict == "refused");
+        println!("| {rate} | {:.1} | {verdict} |", load * 100.0);
+    }
+}

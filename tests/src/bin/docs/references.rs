@@ -1,0 +1,77 @@
+//! Links and paths in documents: each leads to something.
+
+use std::fs;
+use std::path::Path;
+
+use crate::Problem;
+use crate::markdown::Document;
+
+/// Folders whose names begin the paths that are checked when they stand in backquotes.
+const FOLDERS: [&str; 5] = ["docs/", "firmware/", "plant-sim/", "protocol/", "tests/"];
+
+/// Links of the document at `path`, and paths from `root` in backquotes, that lead nowhere.
+pub(crate) fn check(document: &Document, path: &Path, root: &Path) -> Vec<Problem> {
+    let folder = path.parent().unwrap_or(root);
+    let links = document.links().filter_map(|(line, target)| {
+        let found = link_leads_somewhere(target, document, folder);
+        (!found).then(|| Problem::new(line, format!("link to '{target}', which is not there")))
+    });
+    let paths = document
+        .code_spans()
+        .into_iter()
+        .filter_map(|(line, span)| {
+            let word = span.split_whitespace().next()?;
+            let is_path = FOLDERS.iter().any(|folder| word.starts_with(folder));
+            (is_path && !exists(root, word))
+                .then(|| Problem::new(line, format!("'{word}' is no file or folder")))
+        });
+    links.chain(paths).collect()
+}
+
+fn link_leads_somewhere(target: &str, document: &Document, folder: &Path) -> bool {
+    if target.contains("://") {
+        return true;
+    }
+    let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+    if file.is_empty() {
+        return document.has_anchor(anchor);
+    }
+    let file = folder.join(file);
+    if anchor.is_empty() {
+        return file.exists();
+    }
+    fs::read_to_string(file).is_ok_and(|text| Document::new(&text).has_anchor(anchor))
+}
+
+/// Whether there is such a file. A star in the last part of the path stands for anything.
+fn exists(root: &Path, path: &str) -> bool {
+    let Some((before, after)) = path.split_once('*') else {
+        return root.join(path).exists();
+    };
+    let (folder, prefix) = before.rsplit_once('/').unwrap_or(("", before));
+    fs::read_dir(root.join(folder)).is_ok_and(|entries| {
+        entries.flatten().any(|entry| {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            name.starts_with(prefix) && name.ends_with(after)
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_there_is_found() {
+        let root = crate::root();
+        let text = "# Here\n[a](README.md) [b](#here) [c](https://x.y) [d](docs/motion.md#the-control-laws)\n\
+                    [e](none.md) [f](#there) [g](docs/motion.md#none)\n\
+                    `tests/run rust` `tests/ci/1*.sh` `firmware/src`\n`tests/none` `tests/ci/none*.sh`\n";
+        let lines: Vec<_> = check(&Document::new(text), &root.join("X.md"), &root)
+            .into_iter()
+            .map(|problem| problem.line)
+            .collect();
+        assert_eq!(lines, [3, 3, 3, 5, 5]);
+    }
+}
