@@ -32,7 +32,7 @@ impl Default for Series {
 
 impl Series {
     /// Whether it has no value.
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.bins.is_empty()
     }
 

@@ -12,7 +12,7 @@ use trace::select::{Ids, Moment, Selection};
 
 /// A trace, and which of its records count.
 #[derive(Args)]
-pub struct InputArgs {
+pub(crate) struct InputArgs {
     /// candump log, candump's screen output, Vector ASC or pcapng, also with gzip; - for standard input.
     pub file: PathBuf,
     /// Only these identifiers: hexadecimal, 3 digits (11 bits) or 8 (29 bits), a range (300-3FF) or a message's name.
@@ -27,7 +27,7 @@ pub struct InputArgs {
 }
 
 impl InputArgs {
-    pub fn selection(&self, to: Option<Moment>) -> Selection {
+    pub(crate) fn selection(&self, to: Option<Moment>) -> Selection {
         Selection {
             ids: self.id.clone(),
             interfaces: self.interface.clone(),
@@ -39,7 +39,7 @@ impl InputArgs {
 
 /// The end of what counts; apart from [`InputArgs`], since `convert` calls its format so, too.
 #[derive(Args)]
-pub struct EndArgs {
+pub(crate) struct EndArgs {
     /// Only up to this time: seconds as the trace has them, or after its first record (+12.5).
     #[arg(long, value_name = "S")]
     pub to: Option<Moment>,
@@ -55,7 +55,7 @@ fn interface(text: &str) -> Result<Interface, String> {
 }
 
 /// Bit rates of the recorded bus.
-pub fn bit_timing(text: &str) -> Result<BitTiming, String> {
+pub(super) fn bit_timing(text: &str) -> Result<BitTiming, String> {
     let rate = |text: &str| {
         let (digits, unit) = match text.strip_suffix(['k', 'K']) {
             Some(digits) => (digits, 1e3),
@@ -88,7 +88,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 
 /// Arguments of `decode`.
 #[derive(Args)]
-pub struct DecodeArgs {
+pub(crate) struct DecodeArgs {
     #[command(flatten)]
     pub input: InputArgs,
     #[command(flatten)]
@@ -102,7 +102,7 @@ pub struct DecodeArgs {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-pub enum FormatChoice {
+pub(crate) enum FormatChoice {
     /// A line for each frame.
     Text,
     /// A row for each field.
@@ -113,7 +113,7 @@ pub enum FormatChoice {
 
 /// Arguments of `stats`.
 #[derive(Args)]
-pub struct StatsArgs {
+pub(crate) struct StatsArgs {
     #[command(flatten)]
     pub input: InputArgs,
     #[command(flatten)]
@@ -134,7 +134,7 @@ pub struct StatsArgs {
 
 /// Arguments of `plot`.
 #[derive(Args)]
-pub struct PlotArgs {
+pub(crate) struct PlotArgs {
     #[command(flatten)]
     pub input: InputArgs,
     #[command(flatten)]
@@ -149,7 +149,7 @@ pub struct PlotArgs {
 
 /// Arguments of `check`.
 #[derive(Args)]
-pub struct CheckArgs {
+pub(crate) struct CheckArgs {
     /// The whole trace is followed; offences of what is not selected are passed over.
     #[command(flatten)]
     pub input: InputArgs,
@@ -162,7 +162,7 @@ pub struct CheckArgs {
 
 /// Arguments of `replay`.
 #[derive(Args)]
-pub struct ReplayArgs {
+pub(crate) struct ReplayArgs {
     /// For the controller the trace must begin before its first sample; it gets all of it, and what is selected is
     /// compared.
     #[command(flatten)]
@@ -205,7 +205,7 @@ fn speed(text: &str) -> Result<f64, String> {
 
 /// Arguments of `convert`.
 #[derive(Args)]
-pub struct ConvertArgs {
+pub(crate) struct ConvertArgs {
     #[command(flatten)]
     pub input: InputArgs,
     /// What it becomes: pcapng (Wireshark, tshark), asc (CANalyzer, CANoe) or candump (can-utils, python-can); and, as a
@@ -237,7 +237,7 @@ fn goal(text: &str) -> Result<Goal, String> {
 
 impl ConvertArgs {
     /// The one format, and the end if there is one.
-    pub fn goals(&self) -> Result<(Target, Option<Moment>), String> {
+    pub(crate) fn goals(&self) -> Result<(Target, Option<Moment>), String> {
         let (mut formats, mut ends) = (Vec::new(), Vec::new());
         for goal in &self.to {
             match goal {

@@ -35,7 +35,7 @@ fn place<T>(source: &Source, interface: Interface, all: &PerInterface<T>) -> Str
     }
 }
 
-pub fn check(args: &CheckArgs) -> Result<ExitCode, String> {
+pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, String> {
     finish_on_signal()?;
     let arm = ArmModel::from(&load(args.model.as_ref())?);
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
@@ -67,7 +67,7 @@ pub fn check(args: &CheckArgs) -> Result<ExitCode, String> {
     Ok(verdict)
 }
 
-pub fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
+pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
     if let Some(bus) = &args.bus {
         return play(args, bus);
     }

@@ -11,14 +11,14 @@ use trace::Record;
 use super::source::{Source, input};
 
 /// Writes every record that counts, as they come.
-pub trait Records {
+pub(super) trait Records {
     fn record(&mut self, record: &Record) -> io::Result<()>;
     fn flush(&mut self) -> io::Result<()>;
 }
 
 /// Hands every record on; when the input has nothing more to give at once, so that a person at the end of a pipe sees
 /// what there is.
-pub fn each(source: &mut Source, sink: &mut impl Records) -> io::Result<()> {
+pub(super) fn each(source: &mut Source, sink: &mut impl Records) -> io::Result<()> {
     while let Some(record) = source.record() {
         sink.record(&record)?;
         if source.is_drained() {
@@ -29,7 +29,7 @@ pub fn each(source: &mut Source, sink: &mut impl Records) -> io::Result<()> {
 }
 
 /// Refuses an output that is the input.
-pub fn refuse_same(file: &Path, out: Option<&Path>) -> Result<(), String> {
+pub(super) fn refuse_same(file: &Path, out: Option<&Path>) -> Result<(), String> {
     let Some(out) = out else {
         return Ok(());
     };
@@ -50,7 +50,7 @@ pub fn refuse_same(file: &Path, out: Option<&Path>) -> Result<(), String> {
 
 /// Does the writing, to the file or to standard output. A reader of standard output that has seen enough and gone
 /// (`| head`) is no error.
-pub fn written(
+pub(super) fn written(
     out: Option<&Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), String> {

@@ -36,7 +36,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 
 /// From now on a signal (Ctrl-C, SIGTERM) ends the trace as if its file ended, so that what was gathered until then is
 /// shown. A second one ends the process.
-pub fn finish_on_signal() -> Result<(), String> {
+pub(super) fn finish_on_signal() -> Result<(), String> {
     ctrlc::set_handler(|| {
         if STOP.swap(true, Ordering::Relaxed) {
             process::exit(INTERRUPTED);
@@ -88,7 +88,7 @@ impl Read for Counted {
 }
 
 impl Source {
-    pub fn open(path: &Path, selection: Selection) -> Result<Self, String> {
+    pub(super) fn open(path: &Path, selection: Selection) -> Result<Self, String> {
         let mut name = path.display().to_string();
         let failed = |error: io::Error| format!("cannot read {}: {error}", path.display());
         let input = input(path).map_err(failed)?;
@@ -133,7 +133,7 @@ impl Source {
     }
 
     /// The next line of an interface that counts; `None` at the end.
-    pub fn line(&mut self) -> Option<Result<Record, Problem>> {
+    pub(super) fn line(&mut self) -> Option<Result<Record, Problem>> {
         loop {
             self.progress();
             match self.reader.next()? {
@@ -162,7 +162,7 @@ impl Source {
     }
 
     /// The next record of an interface that counts; lines that cannot be read are named on standard error and left out.
-    pub fn record_of_interface(&mut self) -> Option<Record> {
+    pub(super) fn record_of_interface(&mut self) -> Option<Record> {
         loop {
             match self.line()? {
                 Ok(record) => return Some(record),
@@ -177,7 +177,7 @@ impl Source {
     }
 
     /// The next record that counts in every respect.
-    pub fn record(&mut self) -> Option<Record> {
+    pub(super) fn record(&mut self) -> Option<Record> {
         loop {
             let record = self.record_of_interface()?;
             if self.counts(&record) {
@@ -187,13 +187,13 @@ impl Source {
     }
 
     /// Whether the record has an identifier and a time that count.
-    pub fn counts(&self, record: &Record) -> bool {
+    pub(super) fn counts(&self, record: &Record) -> bool {
         let first_us = self.first_us.unwrap_or(record.time_us);
         self.selection.id(record) && self.selection.time(record, first_us)
     }
 
     /// Whether the next record has to be waited for.
-    pub fn is_drained(&self) -> bool {
+    pub(super) fn is_drained(&self) -> bool {
         !self.reader.source().buffer().contains(&b'\n')
     }
 
@@ -203,7 +203,7 @@ impl Source {
     }
 
     /// Success only if there was something and every line could be read.
-    pub fn verdict(&self) -> Result<ExitCode, String> {
+    pub(super) fn verdict(&self) -> Result<ExitCode, String> {
         if let Some(failure) = &self.failure {
             return Err(failure.clone());
         }
@@ -218,7 +218,7 @@ impl Source {
     }
 
     /// Says that nothing was judged, and why: what is selected is not there, or `what`.
-    pub fn nothing(&self, what: &str) -> ExitCode {
+    pub(super) fn nothing(&self, what: &str) -> ExitCode {
         let name = &self.name;
         match (self.selected, self.records) {
             (0, records @ 1..) => {
@@ -244,7 +244,7 @@ impl Source {
 }
 
 /// The file, or standard input for `-`: without a buffer of its own, so that it can be waited for.
-pub fn input(path: &Path) -> io::Result<File> {
+pub(super) fn input(path: &Path) -> io::Result<File> {
     if path == Path::new("-") {
         io::stdin().as_fd().try_clone_to_owned().map(File::from)
     } else {

@@ -17,7 +17,7 @@ const FLAG_BRS: u32 = 1 << 13;
 const FLAG_ESI: u32 = 1 << 14;
 
 /// An ASC file.
-pub struct Asc<W> {
+pub(super) struct Asc<W> {
     pub(super) sink: W,
     interfaces: Interfaces,
     start_us: Option<u64>,

@@ -11,7 +11,7 @@ const BUS_ERROR: u32 = 0x80;
 
 /// State between two lines.
 #[derive(Default)]
-pub struct Asc {
+pub(super) struct Asc {
     decimal: bool,
     /// Times count from the line before instead of from the start.
     relative: bool,
@@ -23,12 +23,12 @@ pub struct Asc {
 
 impl Asc {
     /// Whether a file that begins so is ASC.
-    pub fn begins(line: &[u8]) -> bool {
+    pub(super) fn begins(line: &[u8]) -> bool {
         line.starts_with(b"date ") || line.starts_with(b"base ")
     }
 
     /// Record of a line, if it is one; headers, statistics and events of other kinds are not.
-    pub fn line(&mut self, line: &[u8]) -> Option<Result<Record, Problem>> {
+    pub(super) fn line(&mut self, line: &[u8]) -> Option<Result<Record, Problem>> {
         let text = String::from_utf8_lossy(line);
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
         match words.as_slice() {

@@ -25,12 +25,12 @@ const MAX_BLOCK: usize = 1 << 20;
 const MAX_INTERFACES: usize = 1 << 12;
 
 /// Whether a file begins as pcapng.
-pub fn begins(bytes: &[u8]) -> bool {
+pub(super) fn begins(bytes: &[u8]) -> bool {
     bytes == SECTION_HEADER.to_le_bytes()
 }
 
 /// Whether a file begins as the older pcap, in either byte order and resolution.
-pub fn begins_classic(bytes: &[u8]) -> bool {
+pub(super) fn begins_classic(bytes: &[u8]) -> bool {
     matches!(
         bytes,
         [0xA1, 0xB2, 0xC3, 0xD4]
@@ -42,7 +42,7 @@ pub fn begins_classic(bytes: &[u8]) -> bool {
 
 /// State between two packets.
 #[derive(Default)]
-pub struct Pcapng {
+pub(super) struct Pcapng {
     big_endian: bool,
     interfaces: Vec<Described>,
     block: Vec<u8>,
@@ -59,7 +59,7 @@ struct Described {
 
 impl Pcapng {
     /// The next packet; `packets` counts them.
-    pub fn read(
+    pub(super) fn read(
         &mut self,
         source: &mut impl BufRead,
         packets: &mut u64,

@@ -11,7 +11,7 @@ use crate::{Direction, ERROR_FLAG, Entry, ErrorFrame, Interface, Record};
 const ABSOLUTE: usize = 10;
 
 /// Whether a line is one for the screen: what stands where a log has identifier and data has no `#`.
-pub fn is_screen(line: &[u8]) -> bool {
+pub(super) fn is_screen(line: &[u8]) -> bool {
     let frame = match split_at_byte(line, b')') {
         Some((_, rest)) => words(rest).nth(1),
         None => words(line).nth(1),
@@ -21,12 +21,12 @@ pub fn is_screen(line: &[u8]) -> bool {
 }
 
 /// Whether a line explains the error frame before it (`candump -e`).
-pub fn is_detail(line: &[u8]) -> bool {
+pub(super) fn is_detail(line: &[u8]) -> bool {
     line.starts_with(b"\t")
 }
 
 /// Whether a long line is a CAN XL frame of a log: `can0 45123#81:00:...`.
-pub fn is_can_xl(line: &[u8]) -> bool {
+pub(super) fn is_can_xl(line: &[u8]) -> bool {
     let content = split_at_byte(line, b'#').map_or(line, |(_, content)| content);
     content.get(2) == Some(&b':')
 }
@@ -47,7 +47,7 @@ fn length(word: &[u8]) -> Option<(usize, usize)> {
     Some((text.parse().ok().filter(|_| digits)?, inner.len()))
 }
 
-pub fn parse(line: &[u8]) -> Result<Record, Problem> {
+pub(super) fn parse(line: &[u8]) -> Result<Record, Problem> {
     let line = line.trim_ascii_start();
     let stamped = line.strip_prefix(b"(").ok_or(Problem::Screen)?;
     let (stamp, rest) = split_at_byte(stamped, b')').ok_or(Problem::Timestamp)?;

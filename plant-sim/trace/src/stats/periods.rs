@@ -14,7 +14,7 @@ const TAIL: f64 = 0.05;
 
 /// Periods of one identifier, in us.
 #[derive(Default)]
-pub struct Periods {
+pub(super) struct Periods {
     pub count: u64,
     pub mean: f64,
     squares: f64,
@@ -26,7 +26,7 @@ pub struct Periods {
 
 impl Periods {
     /// Mean and deviation in one pass (Welford 1962).
-    pub fn add(&mut self, period_us: u64) {
+    pub(super) fn add(&mut self, period_us: u64) {
         self.min = if self.count == 0 {
             period_us
         } else {
@@ -42,7 +42,7 @@ impl Periods {
     }
 
     /// What there is to say; `None` without a period.
-    pub fn statistics(&self) -> Option<PeriodStatistics> {
+    pub(super) fn statistics(&self) -> Option<PeriodStatistics> {
         let (low, high) = (self.quantile(TAIL)?, self.quantile(1.0 - TAIL)?);
         Some(PeriodStatistics {
             min_ms: self.min as f64 / 1e3,

@@ -17,7 +17,7 @@ const GAP: f64 = 1.5;
 const LEARNED: u64 = 16;
 
 /// Counts of one identifier.
-pub struct Tally {
+pub(super) struct Tally {
     id: String,
     name: &'static str,
     rate: Rate,
@@ -37,7 +37,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    pub fn new(frame: &CanFrame) -> Self {
+    pub(super) fn new(frame: &CanFrame) -> Self {
         let info = table::of_frame(frame);
         Self {
             id: id(frame),
@@ -59,7 +59,12 @@ impl Tally {
     }
 
     /// Takes a frame in; gives its message if it is one.
-    pub fn frame(&mut self, time_us: u64, frame: &CanFrame, busy_ns: u64) -> Option<Message> {
+    pub(super) fn frame(
+        &mut self,
+        time_us: u64,
+        frame: &CanFrame,
+        busy_ns: u64,
+    ) -> Option<Message> {
         self.frames += 1;
         self.busy_ns += busy_ns;
         // A clock that was set back gives no period.
@@ -95,12 +100,12 @@ impl Tally {
     }
 
     /// A time that is not counted follows.
-    pub fn pause(&mut self) {
+    pub(super) fn pause(&mut self) {
         self.newest_us = None;
     }
 
     /// The node of this number, or every one for 0, starts again.
-    pub fn reset(&mut self, node: u8) {
+    pub(super) fn reset(&mut self, node: u8) {
         let is_it = |sender: Node| node == 0 || node == sender.code();
         if let Some(receiver) = &mut self.receiver
             && self.sender.is_none_or(is_it)
@@ -118,7 +123,7 @@ impl Tally {
         }
     }
 
-    pub fn line(&self, load: f64, rate_hz: f64) -> IdStatistics {
+    pub(super) fn line(&self, load: f64, rate_hz: f64) -> IdStatistics {
         IdStatistics {
             id: self.id.clone(),
             name: self.name,
