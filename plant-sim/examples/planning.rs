@@ -27,7 +27,7 @@ impl Observer for Answers {
             }
             Message::MotionReply(reply) => {
                 if let Some((asked, name)) = self.asked.remove(&reply.sequence) {
-                    let delay = (time - asked).nanos() as f64 * 1e-6;
+                    let delay = time.since(asked).nanos() as f64 * 1e-6;
                     self.delays_ms.entry(name).or_default().push(delay);
                 }
             }

@@ -17,12 +17,12 @@ use protocol::messages::{
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
 
-pub const PERIOD: Period = Period::of_rate(1000.0);
+pub(crate) const PERIOD: Period = Period::of_rate(1000.0);
 /// Past any watchdog of the drives.
-pub const SILENCE: Duration = Duration::from_nanos(PEER_TIMEOUT.nanos() + 1_000);
+pub(crate) const SILENCE: Duration = Duration::from_nanos(PEER_TIMEOUT.nanos() + 1_000);
 
 #[derive(Default)]
-pub struct Wire {
+pub(crate) struct Wire {
     pub to_node: VecDeque<CanFrame>,
     pub from_node: Vec<CanFrame>,
     pub full: bool,
@@ -39,7 +39,7 @@ impl Transmit for Wire {
 }
 
 /// A node, and an arm that stands still whatever it is told; unless it `follows`, and is where the node wants it.
-pub struct Bench {
+pub(crate) struct Bench {
     pub node: Node,
     pub wire: Wire,
     pub now: Instant,
@@ -56,11 +56,11 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::with(Config::new(IRB_930, PERIOD))
     }
 
-    pub fn with(config: Config) -> Self {
+    pub(crate) fn with(config: Config) -> Self {
         let mut bench = Self {
             node: Node::new(config, ResetReason::Watchdog),
             wire: Wire::default(),
@@ -81,20 +81,20 @@ impl Bench {
     }
 
     /// Puts the arm there.
-    pub fn put(&mut self, q: &Vector4<f32>) {
+    pub(crate) fn put(&mut self, q: &Vector4<f32>) {
         let angle = self.drive.motor_angle(q);
         self.position = self.drive.counts_of_motor_angle(&angle);
     }
 
     /// A bench whose axes are under torque.
-    pub fn enabled() -> Self {
+    pub(crate) fn enabled() -> Self {
         let mut bench = Self::new();
         bench.enable();
         assert_eq!(bench.mode(), Mode::Enabled);
         bench
     }
 
-    pub fn enable(&mut self) {
+    pub(crate) fn enable(&mut self) {
         self.hello(table::HASH);
         self.run(2);
         assert_eq!(self.request(MotionRequest::Stop), Some(Outcome::Accepted));
@@ -103,7 +103,7 @@ impl Bench {
     }
 
     /// A bench whose arm is in the middle of a fast move.
-    pub fn moving() -> Self {
+    pub(crate) fn moving() -> Self {
         let mut bench = Self::enabled();
         bench.follows = true;
         let target = [-1.0, 0.5, 0.05, -2.0];
@@ -120,11 +120,11 @@ impl Bench {
         bench
     }
 
-    pub fn mode(&self) -> Mode {
+    pub(crate) fn mode(&self) -> Mode {
         self.node.controller().mode()
     }
 
-    pub fn next_feedback(&mut self) -> CanFrame {
+    pub(crate) fn next_feedback(&mut self) -> CanFrame {
         if self.follows {
             let reference = *self.node.controller().reference();
             self.put(&reference.q);
@@ -144,7 +144,7 @@ impl Bench {
     }
 
     /// Hands over what has been put on the wire, frame by frame, or only the time.
-    pub fn poll(&mut self) -> Vec<Message> {
+    pub(crate) fn poll(&mut self) -> Vec<Message> {
         let mut received = self.wire.to_node.pop_front();
         loop {
             self.node.poll(self.now, received.as_ref(), &mut self.wire);
@@ -161,18 +161,18 @@ impl Bench {
     }
 
     /// One sample with what has been put on the wire; returns what the node sent.
-    pub fn step(&mut self) -> Vec<Message> {
+    pub(crate) fn step(&mut self) -> Vec<Message> {
         self.now += self.period;
         let frame = self.next_feedback();
         self.wire.to_node.push_back(frame);
         self.poll()
     }
 
-    pub fn run(&mut self, samples: usize) -> Vec<Message> {
+    pub(crate) fn run(&mut self, samples: usize) -> Vec<Message> {
         (0..samples).flat_map(|_| self.step()).collect()
     }
 
-    pub fn command(&mut self) -> Command {
+    pub(crate) fn command(&mut self) -> Command {
         let sent = self.step();
         let commands: Vec<_> = sent
             .iter()
@@ -187,13 +187,13 @@ impl Bench {
     }
 
     /// A sample that is lost on its way.
-    pub fn lose(&mut self) {
+    pub(crate) fn lose(&mut self) {
         self.next_feedback();
         self.now += self.period;
     }
 
     /// Control words of the next samples.
-    pub fn words(&mut self, samples: usize) -> Vec<ControlWord> {
+    pub(crate) fn words(&mut self, samples: usize) -> Vec<ControlWord> {
         self.run(samples)
             .iter()
             .filter_map(|message| match message {
@@ -203,7 +203,7 @@ impl Bench {
             .collect()
     }
 
-    pub fn hello(&mut self, schema: u32) {
+    pub(crate) fn hello(&mut self, schema: u32) {
         let hello = Hello {
             schema,
             build: 0,
@@ -213,7 +213,7 @@ impl Bench {
         self.wire.to_node.push_back(encode(&request, 0).unwrap());
     }
 
-    pub fn motion(&mut self, request: MotionRequest) -> CanFrame {
+    pub(crate) fn motion(&mut self, request: MotionRequest) -> CanFrame {
         self.sequence += 1;
         let motion = Motion {
             sequence: self.sequence,
@@ -224,7 +224,7 @@ impl Bench {
         frame
     }
 
-    pub fn request(&mut self, request: MotionRequest) -> Option<Outcome> {
+    pub(crate) fn request(&mut self, request: MotionRequest) -> Option<Outcome> {
         let frame = self.motion(request);
         self.wire.to_node.push_back(frame);
         let sequence = self.sequence;
@@ -234,7 +234,7 @@ impl Bench {
         })
     }
 
-    pub fn refusal(&mut self, request: MotionRequest) -> RefusalReason {
+    pub(crate) fn refusal(&mut self, request: MotionRequest) -> RefusalReason {
         match self.request(request) {
             Some(Outcome::Refused(refusal)) => refusal.reason,
             other => panic!("{request:?} not refused: {other:?}"),
@@ -242,13 +242,13 @@ impl Bench {
     }
 }
 
-pub fn is_off(command: &Command) -> bool {
+pub(crate) fn is_off(command: &Command) -> bool {
     !command.control.contains(ControlWord::TORQUE_ENABLE)
         && !command.control.contains(ControlWord::BRAKE_RELEASE)
         && command.torque == [0.0; 4]
 }
 
-pub fn estop() -> CanFrame {
+pub(crate) fn estop() -> CanFrame {
     let estop = EStop {
         reason: EStopReason::UNSPECIFIED,
         counter: 0,

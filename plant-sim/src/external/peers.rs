@@ -20,12 +20,12 @@ const RETRY: Duration = Duration::from_millis(200);
 const MEET_LIMIT: Duration = Duration::from_secs(60);
 
 /// Node that sends this frame, if only one may.
-pub fn sender(frame: &CanFrame) -> Option<Name> {
+pub(crate) fn sender(frame: &CanFrame) -> Option<Name> {
     table::of_frame(frame).and_then(|info| info.sender)
 }
 
 /// Opens the bus, makes sure that no other plant is on it, and waits until a controller is, which starts afresh.
-pub fn meet(address: &LinkAddress) -> Result<Remote, PeerError> {
+pub(crate) fn meet(address: &LinkAddress) -> Result<Remote, PeerError> {
     let bus = address.to_string();
     let link = Link::open(address).map_err(|error| PeerError {
         who: format!("on {bus}"),
@@ -96,6 +96,6 @@ fn hear(remote: &mut Remote, time: Duration, controller: bool) -> Result<bool, P
 }
 
 /// "Start afresh", to the controller.
-pub fn reset() -> CanFrame {
+pub(crate) fn reset() -> CanFrame {
     codec::encode(&Message::Nmt(Nmt::reset(Name::Controller)), 0).expect("two bytes without floats")
 }

@@ -34,7 +34,7 @@ const ICOUNT_SHIFT: u32 = 10;
 const TICK_NS: u64 = 40;
 
 /// Instructions that this many SysTick counts stand for, while they are counted.
-pub fn instructions(ticks: u32) -> u32 {
+pub(super) fn instructions(ticks: u32) -> u32 {
     (u64::from(ticks) * TICK_NS).div_ceil(1 << ICOUNT_SHIFT) as u32
 }
 
@@ -44,7 +44,7 @@ const LOG: &str = "log";
 
 /// A running board.
 #[derive(Debug)]
-pub struct Board {
+pub(super) struct Board {
     /// What it is told at every start.
     setup: [u8; SETUP_LEN],
     /// `None` once the channel is closed.
@@ -61,7 +61,7 @@ pub struct Board {
 impl Board {
     /// Starts the emulator; `count` makes its clock that of instructions. What the board sends as soon as its bus is open is
     /// appended to `sent`.
-    pub fn start(
+    pub(super) fn start(
         image: &Path,
         setup: &Setup,
         count: bool,
@@ -150,7 +150,7 @@ impl Board {
 
     /// Follows a board that starts again, up to where it is ready; returns how it ended before. What it sends as soon as its
     /// bus is open is appended to `sent`.
-    pub fn restart(&mut self, sent: &mut Vec<CanFrame>) -> Result<Stop, PeerError> {
+    pub(super) fn restart(&mut self, sent: &mut Vec<CanFrame>) -> Result<Stop, PeerError> {
         let stop = self.set_up()?;
         if self.serial.is_some() {
             self.serial(|serial| serial.open(sent))?;
@@ -171,7 +171,7 @@ impl Board {
     }
 
     /// Hands a frame over on the UART, and appends what comes back to `sent`.
-    pub fn exchange(
+    pub(super) fn exchange(
         &mut self,
         frame: &CanFrame,
         sent: &mut Vec<CanFrame>,
@@ -180,12 +180,12 @@ impl Board {
     }
 
     /// Hands over a frame on the UART that resets the board: there is no answer.
-    pub fn send(&mut self, frame: &CanFrame) -> Result<(), PeerError> {
+    pub(super) fn send(&mut self, frame: &CanFrame) -> Result<(), PeerError> {
         self.serial(|serial| serial.send(frame))
     }
 
     /// Closes the bus on the UART; returns how many bytes the board's receiver has lost.
-    pub fn close_bus(&mut self) -> Result<u32, PeerError> {
+    pub(super) fn close_bus(&mut self) -> Result<u32, PeerError> {
         self.serial(Serial::close)?;
         Ok(self.answer(&mut Vec::new())?.number)
     }
@@ -201,7 +201,7 @@ impl Board {
     }
 
     /// Asks and waits for the answer: appends its frames to `sent` and returns what was measured.
-    pub fn ask(
+    pub(super) fn ask(
         &mut self,
         request: &Request,
         sent: &mut Vec<CanFrame>,
@@ -211,7 +211,7 @@ impl Board {
     }
 
     /// Asks for what has no answer: the board is to start again.
-    pub fn tell(&mut self, request: &Request) -> Result<(), PeerError> {
+    pub(super) fn tell(&mut self, request: &Request) -> Result<(), PeerError> {
         self.say(&request.to_bytes())
     }
 
@@ -264,7 +264,7 @@ impl Board {
     }
 
     /// Ends the emulation; returns what the board has logged, as it came.
-    pub fn take_log(&mut self) -> io::Result<Vec<u8>> {
+    pub(super) fn take_log(&mut self) -> io::Result<Vec<u8>> {
         self.close();
         let mut log = Vec::new();
         self.log.read_to_end(&mut log)?;

@@ -7,7 +7,7 @@ use protocol::slcan::{Line, MAX_LINE, Parser, Text};
 
 /// A line to a board that acknowledges every line by an empty one, after what it has to say.
 #[derive(Debug)]
-pub struct Serial<S> {
+pub(super) struct Serial<S> {
     stream: S,
     parser: Parser,
     /// Bytes that came with the last reading, and how many of them are not yet looked at.
@@ -17,7 +17,7 @@ pub struct Serial<S> {
 
 impl<S: Read + Write> Serial<S> {
     /// A line at its beginning.
-    pub fn new(stream: S) -> Self {
+    pub(super) fn new(stream: S) -> Self {
         Self {
             stream,
             parser: Parser::new(),
@@ -27,7 +27,7 @@ impl<S: Read + Write> Serial<S> {
     }
 
     /// Opens the bus: 1 Mbit/s, data phase 5 Mbit/s. What the board sends then is appended to `sent`.
-    pub fn open(&mut self, sent: &mut Vec<CanFrame>) -> io::Result<()> {
+    pub(super) fn open(&mut self, sent: &mut Vec<CanFrame>) -> io::Result<()> {
         // An empty line first: it ends whatever stood in the line before.
         for line in [
             Line::Empty,
@@ -42,18 +42,22 @@ impl<S: Read + Write> Serial<S> {
     }
 
     /// Hands a frame over and appends what the board sends before it acknowledges.
-    pub fn exchange(&mut self, frame: &CanFrame, sent: &mut Vec<CanFrame>) -> io::Result<()> {
+    pub(super) fn exchange(
+        &mut self,
+        frame: &CanFrame,
+        sent: &mut Vec<CanFrame>,
+    ) -> io::Result<()> {
         self.send(frame)?;
         self.answer(sent)
     }
 
     /// Hands a frame over that has no answer.
-    pub fn send(&mut self, frame: &CanFrame) -> io::Result<()> {
+    pub(super) fn send(&mut self, frame: &CanFrame) -> io::Result<()> {
         self.say(Line::Frame(*frame))
     }
 
     /// Closes the bus. There is no answer.
-    pub fn close(&mut self) -> io::Result<()> {
+    pub(super) fn close(&mut self) -> io::Result<()> {
         self.say(Line::Close)
     }
 

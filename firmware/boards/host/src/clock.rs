@@ -12,7 +12,7 @@ use protocol::time::{Duration, Instant, Period};
 const LOCK_STEP_LIMIT: time::Duration = time::Duration::from_secs(1);
 
 /// Source of the time that the node is given.
-pub enum Clock {
+pub(crate) enum Clock {
     /// The machine's: for drives that sample in real time.
     RealTime {
         /// Origin.
@@ -32,13 +32,13 @@ pub enum Clock {
 }
 
 impl Clock {
-    pub fn real_time() -> Self {
+    pub(crate) fn real_time() -> Self {
         Self::RealTime {
             started: time::Instant::now(),
         }
     }
 
-    pub fn lock_step(period: Period) -> Self {
+    pub(crate) fn lock_step(period: Period) -> Self {
         Self::LockStep {
             clock: SampleClock::new(period),
             period,
@@ -48,7 +48,7 @@ impl Clock {
     }
 
     /// Present time.
-    pub fn now(&self) -> Instant {
+    pub(crate) fn now(&self) -> Instant {
         match self {
             Self::RealTime { started } => Instant::from_nanos(started.elapsed().as_nanos() as u64),
             Self::LockStep { clock, .. } => clock.now(),
@@ -56,7 +56,7 @@ impl Clock {
     }
 
     /// A node starts at 0 in lock-step, whoever asked for it: what follows is the same in every run.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         if let Self::LockStep {
             clock,
             period,
@@ -71,7 +71,7 @@ impl Clock {
     }
 
     /// Looks at a frame before the node does. Returns whether the node is to look at the time first.
-    pub fn observe(&mut self, frame: &CanFrame) -> bool {
+    pub(crate) fn observe(&mut self, frame: &CanFrame) -> bool {
         if let Self::LockStep {
             clock,
             heard,
@@ -88,7 +88,7 @@ impl Clock {
     }
 
     /// Time passes without frames. Returns whether the node is to look at its watchdogs.
-    pub fn idle(&mut self) -> bool {
+    pub(crate) fn idle(&mut self) -> bool {
         match self {
             Self::RealTime { .. } => true,
             Self::LockStep {
@@ -110,6 +110,6 @@ impl Clock {
     }
 }
 
-pub fn is_feedback(frame: &CanFrame) -> bool {
+pub(crate) fn is_feedback(frame: &CanFrame) -> bool {
     table::FEEDBACK.identifies(frame)
 }
