@@ -25,7 +25,7 @@ const SILENCE: u32 = 30;
 static WRAPS: AtomicU32 = AtomicU32::new(0);
 
 /// The SysTick interrupt.
-pub fn wrapped() {
+pub(crate) fn wrapped() {
     // The only writer.
     let wraps = WRAPS.load(Ordering::Relaxed);
     WRAPS.store(wraps.wrapping_add(1), Ordering::Relaxed);
@@ -33,7 +33,7 @@ pub fn wrapped() {
 
 /// Speaks slcan until the host closes the bus or is silent for [`SILENCE`].
 #[inline(never)]
-pub fn serve(node: &mut Node, pins: &mut Pins, journal: &mut Journal, period: Period) {
+pub(crate) fn serve(node: &mut Node, pins: &mut Pins, journal: &mut Journal, period: Period) {
     let mut clock = SampleClock::new(period);
     let mut parser = Parser::new();
     let mut open = false;

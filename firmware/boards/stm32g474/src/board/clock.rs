@@ -11,16 +11,16 @@ use embassy_stm32::time::Hertz;
 use protocol::time::{Instant, Period};
 
 /// Period of the timer and of the drives' samples.
-pub const TICK: Period = Period::of_rate(1000.0);
+pub(crate) const TICK: Period = Period::of_rate(1000.0);
 /// Cycles of the core in a period.
-pub const CYCLES_PER_TICK: u32 = 160_000;
+pub(crate) const CYCLES_PER_TICK: u32 = 160_000;
 
 /// Periods since the start.
-pub static TICKS: AtomicU32 = AtomicU32::new(0);
+pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
 
 /// 24 MHz crystal / 6 * 80 = 320 MHz; / 2 for the core, / 4 for FDCAN. 80 MHz is what CiA 601-3 recommends, and the
 /// core's 160 MHz are a multiple of it and within its 170 MHz.
-pub fn config() -> embassy_stm32::Config {
+pub(crate) fn config() -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hse = Some(Hse {
         freq: Hertz(24_000_000),
@@ -42,14 +42,14 @@ pub fn config() -> embassy_stm32::Config {
 }
 
 /// What time it is for the node. A resolution of one sample is enough: the node measures time-outs of many.
-pub struct Clock {
+pub(crate) struct Clock {
     seen: u32,
     now: Instant,
 }
 
 impl Clock {
     /// Starts timer and cycle counter. Call it once.
-    pub fn start() -> Self {
+    pub(crate) fn start() -> Self {
         if let Some(mut core) = cortex_m::Peripherals::take() {
             core.DCB.enable_trace();
             core.DWT.enable_cycle_counter();
@@ -66,12 +66,12 @@ impl Clock {
     }
 
     /// Whether the timer has fired and has not been looked at.
-    pub fn is_due(&self) -> bool {
+    pub(crate) fn is_due(&self) -> bool {
         TICKS.load(Ordering::Relaxed) != self.seen
     }
 
     /// Takes note of the time; `true` if it has moved on.
-    pub fn advance(&mut self) -> bool {
+    pub(crate) fn advance(&mut self) -> bool {
         let ticks = TICKS.load(Ordering::Relaxed);
         let passed = ticks.wrapping_sub(self.seen);
         self.seen = ticks;
@@ -80,7 +80,7 @@ impl Clock {
     }
 
     /// Time noted last.
-    pub fn now(&self) -> Instant {
+    pub(crate) fn now(&self) -> Instant {
         self.now
     }
 }
