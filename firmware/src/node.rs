@@ -5,6 +5,8 @@
 //! handed in only ages it. So lock-step, a virtual bus in real time and a real bus run one and
 //! the same path.
 
+mod parameters;
+
 use nalgebra::Vector4;
 use protocol::bus::Transmit;
 use protocol::codec::{self, DecodeError, Encoder};
@@ -12,20 +14,20 @@ use protocol::counters::Counters;
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, Command, DriveStatus, Emergency, Fault, Feedback, Heartbeat, Hello, Message, Mode,
-    Motion, MotionRequest, NmtCommand, Node as Name, ParameterReply, ParameterRequest, Refusal,
-    RefusalReason, ResetReason, Server, State,
+    Cause, Command, DriveStatus, Emergency, Fault, Feedback, Heartbeat, Message, Mode, Motion,
+    MotionRequest, NmtCommand, Node as Name, ParameterReply, Refusal, RefusalReason, ResetReason,
+    Server, State,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use crate::control::controller::{Config, Controller, Readings};
-use crate::control::fault::{BAD_FRAMES, PEER_TIMEOUT_MS};
+use crate::control::fault::PEER_TIMEOUT_MS;
 use crate::control::phase::{Phase, Probe};
 use crate::control::self_test;
 use crate::control::states::Event;
 
-/// Age of the feedback at which the drives count as silent: torque off, brake.
+/// Age of the feedback at which the drives count as silent, unless set otherwise: torque off, brake.
 pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
 /// Period of the state message.
 const STATE_PERIOD: Duration = Duration::from_millis(20);
@@ -45,6 +47,7 @@ pub struct Node {
     feedback: Receiver,
     motion: Receiver,
     parameter: Receiver,
+    drives_parameter: Receiver,
     encoder: Encoder,
     received: Counters,
     unsent: u16,
@@ -74,6 +77,7 @@ impl Node {
             feedback: Receiver::new(Profile::Fd),
             motion: Receiver::new(Profile::Fd),
             parameter: Receiver::new(Profile::Fd),
+            drives_parameter: Receiver::new(Profile::Fd),
             encoder: Encoder::default(),
             received: Counters::default(),
             unsent: 0,
@@ -197,7 +201,14 @@ impl Node {
             Message::ParameterRequest(Server::Controller, request) => {
                 let verdict = self.parameter.judge(counter);
                 if self.admit(verdict) {
-                    self.parameter(request, bus);
+                    self.parameter(request, verdict, bus);
+                }
+            }
+            Message::ParameterReply(Server::Drives, reply) => {
+                let verdict = self.drives_parameter.judge(counter);
+                // Introductions concern neighbours only.
+                if self.admit(verdict) && !matches!(reply, ParameterReply::Hello(_)) {
+                    self.reply_parameter(*reply, bus);
                 }
             }
             Message::Nmt(nmt) => {
@@ -275,27 +286,6 @@ impl Node {
         }
     }
 
-    fn parameter<B: Transmit>(&mut self, request: &ParameterRequest, bus: &mut B) {
-        let reply = match request {
-            ParameterRequest::Hello(peer) => {
-                self.same_schema = peer.schema == table::HASH;
-                ParameterReply::Hello(Hello {
-                    schema: table::HASH,
-                    build: BUILD,
-                    profile: Hello::PROFILE_FD,
-                })
-            }
-            ParameterRequest::Get { index }
-            | ParameterRequest::Set { index, .. }
-            | ParameterRequest::List { from: index } => ParameterReply::Error {
-                index: *index,
-                error: protocol::messages::ParameterError::NotFound,
-                limit: 0.0,
-            },
-        };
-        self.send(&Message::ParameterReply(Server::Controller, reply), bus);
-    }
-
     /// Counts what the counter says was lost, repeated or late; `true` for a frame to act on.
     fn admit(&mut self, verdict: Verdict) -> bool {
         self.received.judge(verdict);
@@ -317,7 +307,7 @@ impl Node {
     /// Several bad feedback frames in a row stop the arm.
     fn suspect(&mut self, cause: Cause) {
         self.bad_feedback = self.bad_feedback.saturating_add(1);
-        if self.bad_feedback >= BAD_FRAMES {
+        if u32::from(self.bad_feedback) >= self.controller.setup().bad_frames {
             let frames = f32::from(self.bad_feedback);
             self.bad_feedback = 0;
             self.controller.fail(Fault::value(cause, frames, 0.0));
@@ -330,15 +320,14 @@ impl Node {
             return;
         };
         let age = now.since(arrived);
-        if age > PEER_TIMEOUT {
+        let timeout = self.controller.setup().feedback_timeout;
+        if age > Duration::from_micros(u64::from((timeout * 1e6) as u32)) {
             let age_ms = age.nanos() as f32 * 1e-6;
-            self.controller.fail(Fault::value(
-                Cause::PeerSilent,
-                age_ms,
-                PEER_TIMEOUT_MS as f32,
-            ));
+            self.controller
+                .fail(Fault::value(Cause::PeerSilent, age_ms, timeout * 1e3));
             self.newest = None;
             self.feedback.reset();
+            self.drives_parameter.reset();
             self.same_schema = false;
         }
     }
@@ -404,6 +393,3 @@ impl Node {
         }
     }
 }
-
-/// Identifies the build in the handshake.
-const BUILD: u32 = 1;

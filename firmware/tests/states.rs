@@ -174,7 +174,7 @@ fn name(state: State) -> &'static str {
 /// readings here do not have.
 fn after(events: &[Event]) -> Controller {
     let mut config = Config::new(IRB_930, Period::of_rate(1000.0));
-    config.selection.compensation = Compensation::None;
+    config.setup.selection.compensation = Compensation::None;
     let mut controller = Controller::new(config);
     for event in events {
         assert!(controller.event(*event), "{event:?} of {events:?}");

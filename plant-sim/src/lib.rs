@@ -33,6 +33,7 @@ pub mod external;
 pub mod input;
 pub mod monitor;
 pub mod output;
+pub mod parameters;
 pub mod play;
 pub mod plot;
 pub mod progress;

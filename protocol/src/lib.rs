@@ -47,6 +47,7 @@ pub mod frame;
 pub mod hash;
 pub mod messages;
 mod packed;
+pub mod parameters;
 pub mod schema;
 mod signals;
 pub mod slcan;

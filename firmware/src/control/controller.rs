@@ -8,25 +8,26 @@
 //! is allocated and no clock is read. Time is the number of samples.
 
 mod motion;
+mod parameters;
 mod requests;
 mod transitions;
 
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
-    Cause, Compensation, ControlWord, DriveStatus, Fault, Law, LimitFlags, Mode, MotionReply,
-    MotionRequest, Outcome, Refusal,
+    Cause, ControlWord, DriveStatus, Fault, LimitFlags, Mode, MotionReply, MotionRequest, Outcome,
+    Refusal,
 };
 use protocol::time::Period;
 use serde::{Deserialize, Serialize};
 
-use crate::control::fault::MAX_GAP_MS;
-use crate::control::laws::{Gains, Memory, Model, Motion, Selection, Situation, Task};
+use crate::control::laws::{Memory, Model, Motion, Selection, Situation, Task};
 use crate::control::limits;
-use crate::control::monitor::{Monitor, MonitorLimits};
+use crate::control::monitor::Monitor;
 use crate::control::phase::{Phase, Probe};
+use crate::control::setup::Setup;
 use crate::control::states::State;
-use crate::mechanics::arm::{ArmModel, Payload};
+use crate::mechanics::arm::ArmModel;
 use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::clamp;
@@ -34,33 +35,27 @@ use crate::trajectory::Reference;
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use requests::Answer;
 
-/// Time from a sample until its command acts, s: two frames at the default bit timing, and the computing time. The
-/// simulator works it out from the message table and holds this one against it.
-const COMMAND_DELAY: f32 = 249.6e-6;
-/// Time that the brake is given, s: the simulated one opens within 50 ms and closes within 30 ms.
-const BRAKE_DELAY: f32 = 0.06;
 /// Steps of planning for each millisecond of the sampling period.
 const PLANNING_STEPS_PER_MS: f32 = 1.0;
 /// Most steps of planning in a sample: at 100 Hz and slower, planning is as fast as at 100 Hz.
 const MAX_PLANNING_STEPS: f32 = 10.0;
 
-/// Everything a controller is told before it starts.
+/// Configuration, fixed at start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// The robot.
     pub arm: ArmModel,
-    /// What the flange carries at the start.
-    pub payload: Payload,
-    /// Control law at the start.
-    pub selection: Selection,
     /// Sampling period.
     pub period: Period,
-    /// Time from a sample until its command acts at the drives, s.
-    pub command_delay: f32,
-    /// Time the brake takes to open or close, s.
-    pub brake_delay: f32,
-    /// What stops the arm.
-    pub monitor: MonitorLimits,
+    /// What can be changed later, as it is at the start.
+    pub setup: Setup,
+}
+
+/// The part of the configuration that stays.
+#[derive(Clone, Copy, Debug)]
+struct Fixed {
+    arm: ArmModel,
+    period: Period,
 }
 
 impl Config {
@@ -68,16 +63,8 @@ impl Config {
     pub fn new(arm: ArmModel, period: Period) -> Self {
         Self {
             arm,
-            payload: Payload::NONE,
-            selection: Selection {
-                law: Law::ComputedTorqueJoint,
-                compensation: Compensation::Observer,
-                gains: Gains::for_period(period.seconds()),
-            },
             period,
-            command_delay: COMMAND_DELAY,
-            brake_delay: BRAKE_DELAY,
-            monitor: MonitorLimits::DEFAULT,
+            setup: Setup::new(period.seconds()),
         }
     }
 }
@@ -111,7 +98,8 @@ pub struct Actions {
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Controller {
-    config: Config,
+    config: Fixed,
+    setup: Setup,
     body: Body,
     state: State,
     /// Samples that a gap in the feedback may span.
@@ -142,10 +130,14 @@ impl Controller {
     #[inline(never)]
     pub fn new(config: Config) -> Self {
         Self {
-            body: Body::new(&config.arm, &config.payload),
-            config,
+            body: Body::new(&config.arm, &config.setup.payload),
+            config: Fixed {
+                arm: config.arm,
+                period: config.period,
+            },
+            setup: config.setup,
             state: State::SelfTest,
-            max_gap: ((MAX_GAP_MS as f32 * 1e-3 / config.period.seconds() + 0.5) as u32).max(1),
+            max_gap: config.setup.monitor.gap_samples(config.period.seconds()),
             planning_steps: clamp(
                 config.period.seconds() * 1e3 * PLANNING_STEPS_PER_MS + 0.5,
                 1.0,
@@ -157,7 +149,7 @@ impl Controller {
             queue: MoveQueue::new(),
             reference: Reference::rest(Vector4::zeros()),
             memory: Memory::new(),
-            monitor: Monitor::new(&config.arm, &config.monitor),
+            monitor: Monitor::new(&config.arm, &config.setup.monitor),
             excess: Vector4::zeros(),
             error: Vector4::zeros(),
             replies: Deque::new(),
@@ -197,7 +189,12 @@ impl Controller {
 
     /// Law, compensation and gains in use.
     pub fn selection(&self) -> &Selection {
-        &self.config.selection
+        &self.setup.selection
+    }
+
+    /// What can be changed while the controller runs.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
     }
 
     /// Reference of the last sample.
@@ -284,7 +281,7 @@ impl Controller {
         self.reference = self.advance(readings.steps.min(self.max_gap));
         let reference = &self.reference;
         let period = self.config.period.seconds();
-        let lead = self.config.command_delay + 0.5 * period;
+        let lead = self.setup.command_delay + 0.5 * period;
         self.error = reference.q - q;
 
         let motion = Motion {
@@ -314,7 +311,7 @@ impl Controller {
             // The brake holds: what it carries must not be taken for a disturbance.
             self.memory = Memory::new();
         }
-        let torque = self.config.selection.torque(&situation, &mut self.memory);
+        let torque = self.setup.selection.torque(&situation, &mut self.memory);
         if !torque.iter().all(|torque| torque.is_finite()) {
             // Nothing finite that comes in leads here; should it happen, the brake is the answer.
             self.memory = Memory::new();

@@ -10,21 +10,27 @@
 //! * An axis that follows not even while the brake closes has shown that its loop does not work: torque off.
 //! * A drive in fault may be that of the lift, whose load nothing but the brake holds then: brake first.
 //!
-//! `docs/safety.md` has the same table; the test `faults` compares the two.
+//! The limits are the defaults of parameters. `docs/safety.md` has the same table; the test `faults` compares the two.
 
 use protocol::messages::Cause;
+use protocol::parameters::ControllerParameter as Parameter;
 
 use super::states::{Event, Halt, State};
 
 /// Longest gap in the feedback that the trajectory is continued through, ms. Within it an arm at full speed strays by less
 /// than the following error allows: 60 rad/s² x (5 ms)² / 2 is 0.75 mrad at the shoulder.
-pub const MAX_GAP_MS: u32 = 5;
+pub const MAX_GAP_MS: u32 = milliseconds(Parameter::FeedbackGap);
 /// Age of the feedback at which the drives count as silent, ms: the watchdog time of moteus and the heartbeat of ODrive.
 /// The drives have let go long before, after 5 samples without a command.
-pub const PEER_TIMEOUT_MS: u32 = 100;
+pub const PEER_TIMEOUT_MS: u32 = milliseconds(Parameter::FeedbackTimeout);
 /// Rejected, stale or repeated feedback frames in a row that stop the arm: two can be noise, and even at 500 Hz three last
 /// no longer than a gap may.
-pub const BAD_FRAMES: u8 = 3;
+pub const BAD_FRAMES: u8 = Parameter::BadFrames.initial(1.0) as u8;
+
+/// Default of a parameter in s.
+const fn milliseconds(parameter: Parameter) -> u32 {
+    (parameter.initial(1.0) * 1e3 + 0.5) as u32
+}
 
 /// How much of something is a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

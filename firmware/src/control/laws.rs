@@ -24,13 +24,11 @@ mod velocity_loop;
 
 use nalgebra::Vector4;
 use protocol::messages::{Compensation, Law, Refusal, RefusalReason};
+use protocol::parameters::ControllerParameter as Parameter;
 use serde::{Deserialize, Serialize};
 
 use observer::MomentumObserver;
 pub use situation::{Model, Motion, Situation, Task};
-
-/// Largest damping ratio an operator may ask for.
-const MAX_DAMPING: f32 = 5.0;
 
 /// Closed-loop gains, the same three numbers for every law and every robot: they are turned into
 /// accelerations, and inertia turns those into torque.
@@ -45,13 +43,13 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// Gains for an arm as stiff as the model says, sampled every `period` seconds: 150 rad/s,
-    /// or as much less as the delays of slow sampling ask for.
+    /// Defaults of the parameter table, for an arm as stiff as the model says that is sampled every `period` seconds:
+    /// reduced where the sampling delay requires it.
     pub fn for_period(period: f32) -> Self {
         Self {
-            bandwidth: 150.0f32.min(0.15 / period),
-            damping: 1.0,
-            observer: 100.0f32.min(0.1 / period),
+            bandwidth: Parameter::Bandwidth.initial(period),
+            damping: Parameter::Damping.initial(period),
+            observer: Parameter::Observer.initial(period),
         }
     }
 
@@ -61,15 +59,15 @@ impl Gains {
     /// [`RefusalReason::OutOfRange`] with the gain and its bound: a bandwidth or observer corner
     /// above a quarter radian a sample leaves no phase for the delays of sampling and bus.
     pub fn check(&self, period: f32) -> Result<(), Refusal> {
-        let fastest = 0.25 / period;
-        for (value, limit) in [
-            (self.bandwidth, fastest),
-            (self.damping, MAX_DAMPING),
-            (self.observer, fastest),
+        for (value, parameter) in [
+            (self.bandwidth, Parameter::Bandwidth),
+            (self.damping, Parameter::Damping),
+            (self.observer, Parameter::Observer),
         ] {
-            if !(value > 0.0 && value <= limit) {
-                return Err(Refusal::value(RefusalReason::OutOfRange, value, limit));
-            }
+            parameter
+                .rule()
+                .check(value, period)
+                .map_err(|limit| Refusal::value(RefusalReason::OutOfRange, value, limit))?;
         }
         Ok(())
     }

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector4;
 use protocol::messages::{Cause, DriveStatus, Fault, FaultAxis};
+use protocol::parameters::ControllerParameter as Parameter;
 use serde::{Deserialize, Serialize};
 
-use super::fault::MAX_GAP_MS;
 use crate::mechanics::arm::{ArmModel, Axis};
 
 /// Limits whose violation stops the arm.
@@ -17,7 +17,9 @@ pub struct MonitorLimits {
     /// How far past its range a joint may be: rad, rad, m, rad.
     pub range_margin: Vector4<f32>,
     /// Samples in a row before a violation counts.
-    pub samples: u8,
+    pub samples: u32,
+    /// Longest gap in the feedback that the trajectory is continued through, s.
+    pub gap: f32,
 }
 
 impl MonitorLimits {
@@ -26,11 +28,27 @@ impl MonitorLimits {
     /// the way of a stop from a fifth of the full speed, so that overshoot at a limit does not trip. Three samples: two can be
     /// noise.
     pub const DEFAULT: Self = Self {
-        following_error: Vector4::new(0.05, 0.05, 0.01, 0.2),
-        speed_factor: 1.1,
-        range_margin: Vector4::new(0.02, 0.02, 0.002, 0.05),
-        samples: 3,
+        following_error: Vector4::new(
+            Parameter::FollowingErrorShoulder.initial(1.0),
+            Parameter::FollowingErrorElbow.initial(1.0),
+            Parameter::FollowingErrorLift.initial(1.0),
+            Parameter::FollowingErrorWrist.initial(1.0),
+        ),
+        speed_factor: Parameter::SpeedFactor.initial(1.0),
+        range_margin: Vector4::new(
+            Parameter::RangeMarginShoulder.initial(1.0),
+            Parameter::RangeMarginElbow.initial(1.0),
+            Parameter::RangeMarginLift.initial(1.0),
+            Parameter::RangeMarginWrist.initial(1.0),
+        ),
+        samples: Parameter::FaultSamples.initial(1.0) as u32,
+        gap: Parameter::FeedbackGap.initial(1.0),
     };
+
+    /// Samples that a gap in the feedback may span, at a sampling period in s.
+    pub fn gap_samples(&self, period: f32) -> u32 {
+        ((self.gap / period + 0.5) as u32).max(1)
+    }
 }
 
 /// Watches one arm: its limits, made ready for every sample, and violations in a row.
@@ -43,28 +61,38 @@ pub struct Monitor {
     /// Middle of the joint ranges, and how far from it a joint may be.
     middle: Vector4<f32>,
     reach: Vector4<f32>,
-    needed: u8,
-    following_count: u8,
-    speed_count: u8,
-    range_count: u8,
+    needed: u32,
+    following_count: u32,
+    speed_count: u32,
+    range_count: u32,
 }
 
 impl Monitor {
     /// A monitor of `arm` that has seen nothing.
     pub fn new(arm: &ArmModel, limits: &MonitorLimits) -> Self {
-        let speed = arm.limits.velocity * limits.speed_factor;
-        Self {
-            following_error: limits.following_error,
-            // At full speed in the wrong direction.
-            jump: limits.following_error + speed * (2.0 * 1e-3 * MAX_GAP_MS as f32),
-            speed,
+        let mut monitor = Self {
+            following_error: Vector4::zeros(),
+            jump: Vector4::zeros(),
+            speed: Vector4::zeros(),
             middle: 0.5 * (arm.limits.upper + arm.limits.lower),
-            reach: 0.5 * (arm.limits.upper - arm.limits.lower) + limits.range_margin,
-            needed: limits.samples,
+            reach: Vector4::zeros(),
+            needed: 0,
             following_count: 0,
             speed_count: 0,
             range_count: 0,
-        }
+        };
+        monitor.adopt(arm, limits);
+        monitor
+    }
+
+    /// Takes other limits, and keeps the counts.
+    pub fn adopt(&mut self, arm: &ArmModel, limits: &MonitorLimits) {
+        self.following_error = limits.following_error;
+        self.speed = arm.limits.velocity * limits.speed_factor;
+        // At full speed in the wrong direction.
+        self.jump = limits.following_error + self.speed * (2.0 * limits.gap);
+        self.reach = 0.5 * (arm.limits.upper - arm.limits.lower) + limits.range_margin;
+        self.needed = limits.samples;
     }
 
     /// What the drives report about themselves.
@@ -143,7 +171,7 @@ fn first_beyond(value: &Vector4<f32>, limit: &Vector4<f32>) -> Option<Axis> {
 }
 
 /// Counts violations in a row; the axis once there are as many as are `needed`.
-fn count(counter: &mut u8, violation: Option<Axis>, needed: u8) -> Option<Axis> {
+fn count(counter: &mut u32, violation: Option<Axis>, needed: u32) -> Option<Axis> {
     if violation.is_none() {
         *counter = 0;
         return None;

@@ -2,6 +2,7 @@
 
 mod bench;
 mod faults;
+mod parameters;
 mod reports;
 mod requests;
 mod stops;

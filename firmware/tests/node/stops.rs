@@ -118,7 +118,7 @@ fn a_stop_that_is_followed_ends_at_rest() {
 #[test]
 fn a_law_without_a_finite_torque_takes_brake_and_torque_off() {
     let mut config = Config::new(IRB_930, PERIOD);
-    config.selection.gains.bandwidth = f32::NAN;
+    config.setup.selection.gains.bandwidth = f32::NAN;
     let mut bench = Bench::with(config);
     bench.hello(protocol::table::HASH);
     bench.run(2);

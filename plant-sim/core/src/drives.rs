@@ -3,19 +3,26 @@
 //! It owns the sampling clock. A command acts when it arrives, not when it was due; one that does
 //! not come leaves the last torque for [`HOLD_SAMPLES`], then the drives brake and let go.
 
+mod settings;
+
 use protocol::codec::{self, Encoder};
-use protocol::e2e::{Profile, Receiver};
+use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::frame::CanFrame;
-use protocol::messages::{Command, ControlWord, DriveStatus, Feedback, Message};
+use protocol::messages::{
+    Command, ControlWord, DriveStatus, Feedback, Hello, Message, ParameterError, ParameterReply,
+    ParameterRequest, Server,
+};
+use protocol::parameters::{self, DriveParameter};
 use protocol::table;
 use protocol::time::{Instant, Period};
 
 use crate::model::RobotModel;
 use crate::peer::{Outbox, Peer, PeerError, World};
 use crate::plant::Plant;
+use settings::Settings;
 
-/// Samples for which the last command is held when none comes.
-pub const HOLD_SAMPLES: u32 = 5;
+/// Samples for which the last command is held when none comes, unless set otherwise.
+pub const HOLD_SAMPLES: u32 = DriveParameter::HoldSamples.initial(1.0) as u32;
 
 /// What the drives do with the commands they get.
 #[derive(Clone, Debug)]
@@ -25,6 +32,10 @@ pub struct Drives {
     next: Instant,
     encoder: Encoder,
     commands: Receiver,
+    requests: Receiver,
+    settings: Settings,
+    /// The last command asked for more torque than is set.
+    cut: bool,
     /// Encoder counts of the last sample.
     previous: Option<[i32; 4]>,
     /// Radians a count, and the rated torques that feedback is scaled with.
@@ -44,6 +55,9 @@ impl Drives {
             next: Instant::ORIGIN,
             encoder: Encoder::default(),
             commands: Receiver::new(Profile::Fd),
+            requests: Receiver::new(Profile::Fd),
+            settings: Settings::new(&model.drive, period),
+            cut: false,
             previous: None,
             radians_per_count: std::f64::consts::TAU / f64::from(model.drive.encoder_counts),
             rated: model.drive.motor_torque_rated,
@@ -77,7 +91,10 @@ impl Drives {
             status: (DriveStatus::READY | DriveStatus::ENCODER_VALID)
                 .with(DriveStatus::TORQUE_ON, powered)
                 .with(DriveStatus::BRAKE_RELEASED, !plant.brake().is_closed())
-                .with(DriveStatus::TORQUE_SATURATED, plant.is_saturated()),
+                .with(
+                    DriveStatus::TORQUE_SATURATED,
+                    self.cut || plant.is_saturated(),
+                ),
             position: reading.counts,
             velocity,
             torque,
@@ -98,10 +115,46 @@ impl Drives {
         }
     }
 
+    /// Answers a request of the controller, unless it is damaged or not new. A new value is in force from the next command
+    /// or sample on.
+    fn answer(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+        let received = codec::decode(frame).ok()?;
+        let Message::ParameterRequest(Server::Drives, request) = received.message else {
+            return None;
+        };
+        let verdict = self.requests.judge(received.counter.unwrap_or(0));
+        if !verdict.is_new() {
+            return None;
+        }
+        self.settings.at_rest = !self.control.contains(ControlWord::TORQUE_ENABLE);
+        let reply = match request {
+            // The first frame may be a replay: it must not change anything.
+            ParameterRequest::Set { index, .. } if verdict == Verdict::Initial => {
+                ParameterReply::Error {
+                    index,
+                    error: ParameterError::NotNow,
+                    limit: 0.0,
+                }
+            }
+            _ => parameters::serve(&mut self.settings, &request).unwrap_or(ParameterReply::Hello(
+                Hello {
+                    schema: table::HASH,
+                    build: 0,
+                    profile: Hello::PROFILE_FD,
+                },
+            )),
+        };
+        let message = Message::ParameterReply(Server::Drives, reply);
+        let frame = self.encoder.encode(&message);
+        Some(frame.expect("parameters and their bounds are finite"))
+    }
+
     fn apply(&mut self, command: &Command, plant: &mut Plant) {
         self.answered = Some(command.sample);
         self.control = command.control;
-        plant.set_motor_torque(command.torque.map(f64::from));
+        let torque = self.settings.cut(command.torque);
+        self.cut = torque != command.torque.map(f64::from);
+        plant.set_motor_torque(torque);
         plant.set_torque_enabled(command.control.contains(ControlWord::TORQUE_ENABLE));
         plant.set_brake(!command.control.contains(ControlWord::BRAKE_RELEASE));
     }
@@ -112,11 +165,12 @@ impl Drives {
             return;
         };
         let age = self.sample.wrapping_sub(answered).wrapping_sub(1);
-        if age > HOLD_SAMPLES {
+        if age > self.settings.hold_samples() {
             plant.set_brake(true);
             plant.set_torque_enabled(false);
             self.control = ControlWord::EMPTY;
             self.commands.reset();
+            self.requests.reset();
         }
     }
 }
@@ -143,6 +197,9 @@ impl Peer for Drives {
             Some(frame) if table::COMMAND.identifies(frame) => {
                 plant.advance_to(now.nanos());
                 self.receive(frame, plant);
+            }
+            Some(frame) if table::DRIVES_PARAMETER_REQUEST.identifies(frame) => {
+                out.extend(self.answer(frame).map(|answer| (now, answer)));
             }
             Some(_) => {}
         }

@@ -297,7 +297,7 @@ impl RigConfig {
     /// What the controller of this rig is configured with.
     pub fn controller(&self) -> Config {
         let mut config = Config::new(self.nominal, self.period);
-        config.command_delay = command_delay(&self.timing).seconds() as f32;
+        config.setup.command_delay = command_delay(&self.timing).seconds() as f32;
         config
     }
 }
@@ -347,6 +347,10 @@ mod tests {
     fn the_controllers_own_delay_is_that_of_the_default_bus() {
         let delay = command_delay(&BitTiming::default());
         let config = Config::new(IRB_930, Period::of_rate(1000.0));
-        assert_eq!(config.command_delay, delay.seconds() as f32, "{delay:?}");
+        assert_eq!(
+            config.setup.command_delay,
+            delay.seconds() as f32,
+            "{delay:?}"
+        );
     }
 }

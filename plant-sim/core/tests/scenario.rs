@@ -204,12 +204,12 @@ fn what_this_robot_cannot_do_is_refused_before_the_run() {
         (
             "[payload]",
             "[gains]\nbandwidth = 2000\ndamping = 1\nobserver = 100\n[payload]",
-            "line 8, column 13: gains.bandwidth is 2000; allowed: more than 0, at most",
+            "line 8, column 13: gains.bandwidth is 2000; allowed: 1 to 250 at 1000 Hz",
         ),
         (
             "[payload]",
             "[gains]\nbandwidth = 100\ndamping = nan\nobserver = 100\n[payload]",
-            "gains.damping is NaN; allowed: more than 0, at most 5 at 1000 Hz",
+            "gains.damping is NaN; allowed: 0.1 to 5 at 1000 Hz",
         ),
         // The hand already holds the payload of the start.
         (

@@ -6,6 +6,7 @@ mod dbc;
 mod eval;
 mod model;
 mod monitor;
+mod parameters;
 mod run;
 mod timing;
 mod trace;
@@ -43,6 +44,8 @@ enum Command {
     Trace(trace::TraceCommand),
     /// Watch a bus: identifiers, rates, values, load, states and faults.
     Monitor(monitor::MonitorArgs),
+    /// List and set parameters of controller and drives over a bus.
+    Parameters(parameters::ParametersArgs),
     /// Write the messages of the link as a DBC file.
     Dbc(dbc::DbcArgs),
     /// Write a robot as an external controller takes it (controller --model).
@@ -61,6 +64,7 @@ pub(crate) fn main() -> Result<ExitCode, String> {
         Some(Command::Timing(args)) => timing::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),
         Some(Command::Monitor(args)) => monitor::run(&args),
+        Some(Command::Parameters(args)) => parameters::run(&args),
         Some(Command::Dbc(args)) => dbc::run(&args),
         Some(Command::Model(args)) => model::run(&args),
     }

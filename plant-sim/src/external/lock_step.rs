@@ -25,6 +25,8 @@ pub struct LockStep {
     begun: bool,
     /// Whether the twin still knows all that the controller knows.
     follows: bool,
+    /// Whether the controller has let a whole [`ANSWER_LIMIT`] pass.
+    late: bool,
     period: time::Duration,
     /// What the controller has sent, empty between calls.
     sent: Vec<CanFrame>,
@@ -41,6 +43,7 @@ impl LockStep {
             twin: Twin::new(config),
             begun: false,
             follows: true,
+            late: false,
             period: config.period.duration().into(),
             sent: Vec::new(),
         })
@@ -54,7 +57,8 @@ impl LockStep {
                 Some(Name::Drives | Name::Operator) => {
                     return Err(self.remote.second_plant(&frame));
                 }
-                // Somebody else has spoken, an emergency stop perhaps, and only the controller knows when it heard it.
+                // Somebody else has spoken, an emergency stop or a parameter request perhaps, and only the controller knows
+                // when it heard it.
                 None => self.follows = false,
             }
         }
@@ -99,7 +103,9 @@ impl LockStep {
     fn exchange(&mut self, now: Instant, frame: &CanFrame) -> Result<(), PeerError> {
         self.twin.call(now, Some(frame));
         self.remote.send(frame);
-        let patience = if self.follows {
+        // Feedback is answered by a command in every case; what else is answered, only a twin that follows knows.
+        let commanded = table::FEEDBACK.identifies(frame) && !self.late;
+        let patience = if self.follows || commanded {
             ANSWER_LIMIT
         } else {
             self.period
@@ -117,6 +123,7 @@ impl LockStep {
                         ANSWER_LIMIT.as_secs()
                     );
                 }
+                self.late |= patience == ANSWER_LIMIT;
                 self.follows = false;
                 self.twin.due().clear();
                 break;

@@ -19,9 +19,12 @@ const RETRY: Duration = Duration::from_millis(200);
 /// Longest wait for a controller.
 const MEET_LIMIT: Duration = Duration::from_secs(60);
 
-/// Node that sends this frame, if only one may.
-pub(crate) fn sender(frame: &CanFrame) -> Option<Name> {
-    table::of_frame(frame).and_then(|info| info.sender)
+/// Node that sends this frame, if only one may. A parameter request may come from a tool beside the operator
+/// (`plant-sim parameters`), and makes no second plant.
+pub fn sender(frame: &CanFrame) -> Option<Name> {
+    table::of_frame(frame)
+        .filter(|info| info.id != table::CONTROLLER_PARAMETER_REQUEST.id)
+        .and_then(|info| info.sender)
 }
 
 /// Opens the bus, makes sure that no other plant is on it, and waits until a controller is, which starts afresh.

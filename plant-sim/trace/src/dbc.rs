@@ -6,8 +6,9 @@
 use std::fmt::Write as _;
 
 use protocol::e2e::Profile;
-use protocol::messages::Node;
-use protocol::schema::{Kind, MessageInfo, Rate, Signal};
+use protocol::messages::{Node, Server};
+use protocol::parameters;
+use protocol::schema::{Content, Kind, MessageInfo, Rate, Signal};
 use protocol::table::{self, TABLE};
 
 use crate::fields::full_name;
@@ -270,7 +271,39 @@ fn comments(text: &mut String) {
                 line!(text, "CM_ SG_ {} {} \"{comment}\";", info.id, cell.name);
             }
         }
+        let index = match info.content {
+            Content::ParameterReply(server) => Some(("value_index", server)),
+            Content::ParameterRequest(server) => Some(("set_index", server)),
+            _ => None,
+        };
+        if let Some((signal, server)) = index {
+            let numbers = numbers(server);
+            line!(text, "CM_ SG_ {} {signal} \"{numbers}\";", info.id);
+        }
     }
+}
+
+/// What the parameters of a server are; the controller also answers for the drives.
+fn numbers(server: Server) -> String {
+    let rows: Vec<String> = parameters::all()
+        .filter(|parameter| server == Server::Controller || parameter.server() == server)
+        .map(|parameter| {
+            let rule = &parameter.rule;
+            let unit = match parameter.unit {
+                "" => String::new(),
+                unit => format!(" {unit}"),
+            };
+            format!(
+                "{} {}: {} to {}{unit}, settable {}",
+                rule.number,
+                parameter.name,
+                rule.lower,
+                rule.upper,
+                rule.settable.name()
+            )
+        })
+        .collect();
+    rows.join("; ")
 }
 
 fn describe(info: &MessageInfo) -> String {

@@ -120,3 +120,19 @@ fn every_field_is_there() {
         );
     }
 }
+
+/// Whoever reads a number on the bus finds its name, unit and range in the file.
+#[test]
+fn parameters_are_named_where_their_numbers_are() {
+    let text = dbc::generate();
+    for parameter in protocol::parameters::all() {
+        let row = format!("{} {}: ", parameter.rule.number, parameter.name);
+        // Reply and request of the controller, and those of the drives for what is theirs.
+        let expected = match parameter.server() {
+            protocol::messages::Server::Controller => 2,
+            protocol::messages::Server::Drives => 4,
+        };
+        assert_eq!(text.matches(&row).count(), expected, "{row}");
+    }
+    assert!(text.contains("16 bandwidth: 1 to 1000 rad/s, settable at rest; "));
+}

@@ -101,11 +101,11 @@ codes! {
     pub enum ParameterError {
         /// No parameter of this number, or in a listing none from it on.
         NotFound = 0, "not-found";
-        /// The parameter cannot be written. Reserved: not raised yet.
+        /// The parameter cannot be written.
         ReadOnly = 1, "read-only";
-        /// The value is out of the parameter's range. Reserved: not raised yet.
+        /// The value is out of the parameter's range.
         OutOfRange = 2, "out-of-range";
-        /// Not in the present state. Reserved: not raised yet.
+        /// Not in the present state.
         NotNow = 3, "not-now";
     }
 }

@@ -23,8 +23,6 @@ impl Controller {
         sequence: u8,
         request: &MotionRequest,
     ) -> Result<Answer, Refusal> {
-        let idle = matches!(self.state, State::Ready | State::PreOperational)
-            || (self.state == State::Enabled && self.queue.is_empty());
         let answer = match request {
             MotionRequest::Enable => return self.operate(Event::Enable),
             MotionRequest::Disable if !self.queue.is_empty() => {
@@ -63,7 +61,7 @@ impl Controller {
                 };
                 self.enqueue(sequence, target, *speed)?
             }
-            _ if !idle => return Err(Refusal::because(RefusalReason::Moving)),
+            _ if !self.is_idle() => return Err(Refusal::because(RefusalReason::Moving)),
             MotionRequest::SetPayload { mass, com, inertia } => {
                 let payload = Payload {
                     mass: *mass,
@@ -74,9 +72,9 @@ impl Controller {
                     .arm
                     .validate_payload(&payload)
                     .map_err(payload_refusal)?;
-                self.config.payload = payload;
-                self.body = Body::new(&self.config.arm, &self.config.payload);
-                self.memory = Memory::new();
+                self.setup.payload = payload;
+                self.body = Body::new(&self.config.arm, &self.setup.payload);
+                self.forget();
                 Answer::Now
             }
             MotionRequest::SelectLaw { law, compensation }
@@ -85,9 +83,9 @@ impl Controller {
                 return Err(Refusal::because(RefusalReason::NoCompensation));
             }
             MotionRequest::SelectLaw { law, compensation } => {
-                self.config.selection.law = *law;
-                self.config.selection.compensation = *compensation;
-                self.memory = Memory::new();
+                self.setup.selection.law = *law;
+                self.setup.selection.compensation = *compensation;
+                self.forget();
                 Answer::Now
             }
             MotionRequest::SetGains {
@@ -101,12 +99,26 @@ impl Controller {
                     observer: *observer,
                 };
                 gains.check(self.config.period.seconds())?;
-                self.config.selection.gains = gains;
-                self.memory = Memory::new();
+                self.setup.selection.gains = gains;
+                self.forget();
                 Answer::Now
             }
         };
         Ok(answer)
+    }
+
+    /// What the law remembers belongs to the gains and the model it was gathered with.
+    // Out of line, as the next: each is asked for in several places, none of them in a sample.
+    #[inline(never)]
+    pub(super) fn forget(&mut self) {
+        self.memory = Memory::new();
+    }
+
+    /// Nothing moves or is about to, and nothing is wrong: what torques come from may change.
+    #[inline(never)]
+    pub(super) fn is_idle(&self) -> bool {
+        matches!(self.state, State::Ready | State::PreOperational)
+            || (self.state == State::Enabled && self.queue.is_empty())
     }
 
     fn operate(&mut self, event: Event) -> Result<Answer, Refusal> {

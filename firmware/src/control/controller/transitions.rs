@@ -4,7 +4,7 @@ use nalgebra::Vector4;
 use protocol::messages::{Cause, ControlWord, DriveStatus, Fault, LimitFlags};
 
 use super::Controller;
-use crate::control::fault::{self, MAX_GAP_MS};
+use crate::control::fault;
 use crate::control::laws::Memory;
 use crate::control::monitor::Monitor;
 use crate::control::states::{Event, Halt, State};
@@ -12,7 +12,7 @@ use crate::control::states::{Event, Halt, State};
 impl Controller {
     /// Takes the transition that the state has for `event`; returns whether there is one.
     pub fn event(&mut self, event: Event) -> bool {
-        let brake = (self.config.brake_delay / self.config.period.seconds()) as u32 + 1;
+        let brake = (self.setup.brake_delay / self.config.period.seconds()) as u32 + 1;
         let Some(next) = self.state.after(event, brake) else {
             return false;
         };
@@ -63,7 +63,7 @@ impl Controller {
     pub(super) fn bridge(&mut self, steps: u32) {
         if steps > self.max_gap {
             let gap = steps as f32 * self.config.period.seconds() * 1e3;
-            let fault = Fault::value(Cause::FeedbackLost, gap, MAX_GAP_MS as f32);
+            let fault = Fault::value(Cause::FeedbackLost, gap, self.setup.monitor.gap * 1e3);
             self.fail(fault);
         } else if self.state.is_powered() {
             self.limits = self.limits | LimitFlags::PREDICTED;

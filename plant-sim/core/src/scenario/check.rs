@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use firmware::control::laws::Gains;
+use protocol::parameters::ControllerParameter as Parameter;
 use toml::de::{DeTable, DeValue};
 
 use super::{Jump, Line, MAX_CYCLES, PayloadSpec, Scenario, ScenarioError, Step, check_rate};
@@ -48,45 +48,21 @@ impl Scenario {
     /// See [`ScenarioError`].
     pub fn check_with(&self, robot: &RobotModel) -> Result<(), ScenarioError> {
         if let Some(gains) = &self.gains {
-            let usual = Gains::for_period((1.0 / self.rate_hz) as f32);
-            for (key, value, gains) in [
-                (
-                    "gains.bandwidth",
-                    gains.bandwidth,
-                    Gains {
-                        bandwidth: gains.bandwidth as f32,
-                        ..usual
-                    },
-                ),
-                (
-                    "gains.damping",
-                    gains.damping,
-                    Gains {
-                        damping: gains.damping as f32,
-                        ..usual
-                    },
-                ),
-                (
-                    "gains.observer",
-                    gains.observer,
-                    Gains {
-                        observer: gains.observer as f32,
-                        ..usual
-                    },
-                ),
+            let period = (1.0 / self.rate_hz) as f32;
+            for (key, value, parameter) in [
+                ("gains.bandwidth", gains.bandwidth, Parameter::Bandwidth),
+                ("gains.damping", gains.damping, Parameter::Damping),
+                ("gains.observer", gains.observer, Parameter::Observer),
             ] {
-                gains
-                    .check((1.0 / self.rate_hz) as f32)
-                    .map_err(|refusal| {
-                        self.wrong(
-                            key,
-                            value,
-                            format!(
-                                "more than 0, at most {} at {} Hz",
-                                refusal.limit, self.rate_hz
-                            ),
-                        )
-                    })?;
+                let rule = parameter.rule();
+                rule.check(value as f32, period).map_err(|_| {
+                    let (lower, upper) = (rule.lower, rule.upper_at(period));
+                    self.wrong(
+                        key,
+                        value,
+                        format!("{lower} to {upper} at {} Hz", self.rate_hz),
+                    )
+                })?;
             }
         }
         let carry = Allowed::within(0.0, robot.payload_max, "kg");

@@ -71,7 +71,7 @@ fn frames_have_the_layout_of_linux() {
 #[test]
 fn the_configuration_comes_back_to_the_bit() {
     let mut config = Config::new(IRB_930, Period::of_rate(1000.0));
-    config.command_delay = 2.345e-4;
+    config.setup.command_delay = 2.345e-4;
     config.arm.geometry.a2 = f32::from_bits(0x3EFA_E148);
     for channel in [Channel::Fifo, Channel::Uart] {
         let setup = Setup { channel, config };

@@ -31,7 +31,7 @@ const RECEIVED: usize = 16;
 const TO_SEND: usize = 8;
 
 /// What the node listens to. Everything else, extended and remote frames included, stops at the filters.
-const FILTERS: [(StandardFilterSlot, u16); 5] = [
+const FILTERS: [(StandardFilterSlot, u16); 6] = [
     (StandardFilterSlot::_0, table::NMT.id),
     (StandardFilterSlot::_1, table::ESTOP.id),
     (StandardFilterSlot::_2, table::FEEDBACK.id),
@@ -40,6 +40,7 @@ const FILTERS: [(StandardFilterSlot, u16); 5] = [
         StandardFilterSlot::_4,
         table::CONTROLLER_PARAMETER_REQUEST.id,
     ),
+    (StandardFilterSlot::_5, table::DRIVES_PARAMETER_REPLY.id),
 ];
 
 /// Time quanta of 12.5 ns. Nominal: 1 + 63 + 16, sample point at 80 %.
