@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use sim::observer::Observer;
-use sim::operator::Hand;
+use sim::world::Hand;
 
 /// Says on standard error how far a long run is.
 pub struct Progress {

@@ -24,8 +24,9 @@ use crate::external::peers;
 use crate::twin::Twin;
 use board::Board;
 use sim::controller::COMPUTE;
-use sim::observer::Mind;
-use sim::peer::{Outbox, Peer, PeerError, World};
+use sim::peer::{Outbox, Peer, PeerError};
+use sim::world::Mind;
+use sim::world::World;
 use trace::difference::Difference;
 
 /// What the emulation is asked for.

@@ -63,7 +63,10 @@ fn every_frame_is_played_in_order_and_none_before_its_time() {
             lost: 0
         }
     );
-    let expected = format!("\rC\rS8\rY5\rO\rT0000012320102\rb1C0F{}\r", "A5".repeat(64));
+    let expected = format!(
+        "\rC\rS8\rY5\rZ0\rO\rT0000012320102\rb1C0F{}\r",
+        "A5".repeat(64)
+    );
     assert_eq!(heard.join().unwrap(), expected);
 }
 

@@ -17,16 +17,19 @@
 //! scale at which the worst sample touches its limit (Hollerbach, *Dynamic scaling of manipulator
 //! trajectories*, 1984).
 
+mod balance;
+mod stroke;
+mod survey;
 mod verify;
 
 use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
+use super::Trajectory;
 use super::capacity::Capacity;
-use super::path::{Path, PathPoint, check_limits};
-use super::profile::{Bounds, SCurve, Sample};
-use super::request::{Gate, Request, Target, from_ik, from_path};
-use super::{Lift, Trajectory};
+use super::path::{Path, PathPoint};
+use super::profile::{Bounds, SCurve};
+use super::request::{Gate, Request, Target, from_path};
 use crate::mechanics::arm::ArmModel;
 use verify::LINE_STEPS;
 
@@ -224,148 +227,8 @@ impl Planner {
         Ok(())
     }
 
-    /// Reach, limits and the largest joint travel per unit of path; at the ends also the accelerations
-    /// from rest that torque allows, a start for the rounds.
-    fn survey(
-        &mut self,
-        capacity: &Capacity<'_>,
-        point: u8,
-        fastest: Vector4<f32>,
-    ) -> Result<(), Refusal> {
-        // A path straight in joint space lies between its ends.
-        let points = match self.draft.path {
-            Path::Joint { .. } => 1,
-            Path::Line { .. } => SURVEY_POINTS,
-        };
-        let s = f32::from(point) / f32::from(points);
-        let here = self.point(capacity.arm, s)?;
-        check_limits(capacity.arm, &here.q).map_err(from_ik)?;
-        let limits = &capacity.arm.limits;
-        let fastest = fastest.sup(&here.dq.abs());
-        if point == 0 {
-            capacity.check_creep()?;
-            self.bounds.accelerate = self.acceleration_from_rest(capacity, &here);
-        }
-        if point < points {
-            self.stage = Stage::Survey {
-                point: point + 1,
-                fastest,
-            };
-            return Ok(());
-        }
-        self.bounds.brake = self.acceleration_from_rest(capacity, &here);
-        self.bounds.jerk = fill(&limits.jerk, &fastest);
-        self.bounds.speed = fill(&capacity.speed(), &fastest);
-        if self.bounds.speed == f32::MAX {
-            // Nothing travels along the path: at most the lift of a jump moves.
-            self.bounds.speed = 0.0;
-        }
-        self.stage = if self.gate.is_some() {
-            Stage::Stroke { down: false }
-        } else {
-            Stage::Compose { round: 0 }
-        };
-        Ok(())
-    }
-
-    /// The path acceleration at which a joint at rest reaches its limit of torque or acceleration.
-    fn acceleration_from_rest(&self, capacity: &Capacity<'_>, here: &PathPoint) -> f32 {
-        let a = fill(&capacity.arm.limits.acceleration, &here.dq);
-        let along = Sample {
-            a,
-            ..Sample::default()
-        };
-        a * capacity.acceleration_room(here, &along).min(1.0)
-    }
-
-    /// One sample of one half; at the end of a round, new accelerations.
-    fn balance(
-        &mut self,
-        capacity: &Capacity<'_>,
-        round: u8,
-        point: u8,
-        gain: [f32; 2],
-    ) -> Result<(), Refusal> {
-        let profile = &self.draft.profile;
-        let braking = point >= BALANCE_POINTS;
-        let share = (f32::from(point % BALANCE_POINTS) + 0.5) / f32::from(BALANCE_POINTS);
-        let (from, to) = if braking {
-            (profile.brake_start(), profile.duration())
-        } else {
-            (0.0, profile.accelerate_end())
-        };
-        let along = profile.at(from + share * (to - from));
-        let here = self.point(capacity.arm, along.s)?;
-        let [mut speeding_gain, mut braking_gain] = gain;
-        let room = capacity.acceleration_room(&here, &along);
-        if braking {
-            braking_gain = braking_gain.min(room);
-        } else {
-            speeding_gain = speeding_gain.min(room);
-        }
-        if point + 1 < 2 * BALANCE_POINTS {
-            self.stage = Stage::Balance {
-                round,
-                point: point + 1,
-                gain: [speeding_gain, braking_gain],
-            };
-            return Ok(());
-        }
-        let (up, down) = profile.peaks();
-        let ceiling = self.acceleration_ceiling(capacity.arm);
-        let correct = |peak: f32, gain: f32| (peak * gain.max(1.0 / STEP)).min(ceiling);
-        self.bounds.accelerate = correct(up, speeding_gain);
-        self.bounds.brake = correct(down, braking_gain);
-        self.stage = Stage::Compose { round: round + 1 };
-        Ok(())
-    }
-
     fn point(&self, arm: &ArmModel, s: f32) -> Result<PathPoint, Refusal> {
         self.draft.path.at(arm, s).map_err(from_path)
-    }
-
-    /// The joint accelerations' own limits, as a limit along the path.
-    fn acceleration_ceiling(&self, arm: &ArmModel) -> f32 {
-        match &self.draft.path {
-            Path::Joint { delta, .. } => fill(&arm.limits.acceleration, delta),
-            // Varies along a line; the last pass sees to it.
-            Path::Line { .. } => f32::MAX,
-        }
-    }
-
-    /// The profile of one vertical stroke.
-    fn stroke(&mut self, capacity: &Capacity<'_>, down: bool) {
-        let (Some(gate), Path::Joint { start, .. }) = (self.gate, &self.draft.path) else {
-            self.stage = Stage::Compose { round: 0 };
-            return;
-        };
-        let (up_bounds, down_bounds) = capacity.lift(gate.rise.max(gate.fall));
-        let lift = self.draft.lift.get_or_insert(Lift {
-            from: start.z,
-            up: SCurve::default(),
-            down: SCurve::default(),
-            down_start: 0.0,
-        });
-        if down {
-            lift.down = stroke(gate.fall, &down_bounds);
-        } else {
-            lift.up = stroke(gate.rise, &up_bounds);
-        }
-        self.stage = Stage::Clear { down };
-    }
-
-    /// When one stroke passes the clearance.
-    fn clear(&mut self, down: bool) {
-        self.stage = Stage::Compose { round: 0 };
-        let (Some(gate), Some(lift)) = (self.gate, &self.draft.lift) else {
-            return;
-        };
-        if down {
-            self.blended = lift.down.time_at(gate.fall - gate.clearance.min(gate.fall));
-        } else {
-            self.draft.start = lift.up.time_at(gate.clearance.min(gate.rise));
-            self.stage = Stage::Stroke { down: true };
-        }
     }
 
     /// Profile from the bounds, and how the strokes of a jump lie over it in time.
@@ -413,13 +276,4 @@ fn fill(limit: &Vector4<f32>, travel: &Vector4<f32>) -> f32 {
         .filter(|(_, travel)| travel.abs() > NO_TRAVEL)
         .map(|(limit, travel)| limit / travel.abs())
         .fold(f32::MAX, f32::min)
-}
-
-/// A profile over a length that may be nothing.
-fn stroke(length: f32, bounds: &Bounds) -> SCurve {
-    if length > NO_TRAVEL {
-        SCurve::new(length, bounds)
-    } else {
-        SCurve::default()
-    }
 }

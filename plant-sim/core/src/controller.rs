@@ -8,8 +8,9 @@ use protocol::messages::ResetReason;
 use protocol::table;
 use protocol::time::{Duration, Instant};
 
-use crate::observer::Mind;
-use crate::peer::{Outbox, Peer, PeerError, World};
+use crate::peer::{Outbox, Peer, PeerError};
+use crate::world::Mind;
+use crate::world::World;
 
 /// Time that a controller takes from frame in to frames out: 4000 instructions, the budget of a call, at 100 MHz.
 pub const COMPUTE: Duration = Duration::from_micros(40);

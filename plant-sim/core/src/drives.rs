@@ -17,8 +17,9 @@ use protocol::table;
 use protocol::time::{Instant, Period};
 
 use crate::model::RobotModel;
-use crate::peer::{Outbox, Peer, PeerError, World};
+use crate::peer::{Outbox, Peer, PeerError};
 use crate::plant::Plant;
+use crate::world::World;
 use settings::Settings;
 
 /// Samples for which the last command is held when none comes, unless set otherwise.

@@ -10,6 +10,7 @@
 //! rig                    the time line from event to event
 //! peer                   a node on it: controller (in process or elsewhere), and the two others of a cabinet, drives and
 //!                        operator, which know messages and not the controller
+//! world                  what peers share besides the bus: the robot, and what each lets the run know
 //! observer, record       what a run shows, and its trace and truth as text
 //! bus                    arbitration and exact frame times
 //! plant, model           the robot in f64, by a derivation of its own, and its data
@@ -48,3 +49,4 @@ pub mod selection;
 pub mod setup;
 pub mod summary;
 mod text;
+pub mod world;

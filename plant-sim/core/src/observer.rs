@@ -2,13 +2,11 @@
 
 use std::io;
 
-use firmware::node::Node;
 use protocol::frame::CanFrame;
-use protocol::messages::Mode;
 use protocol::time::Instant;
 
-use crate::operator::Hand;
 use crate::plant::Plant;
+use crate::world::{Hand, Mind};
 
 /// One sample as it truly was, and what the controller wanted it to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,37 +45,6 @@ impl PlantState {
             tau: plant.joint_effort(),
             tool: [pose.x, pose.y, pose.z, pose.yaw],
             saturated: plant.is_saturated(),
-        }
-    }
-}
-
-/// What a controller has in mind when it has answered a sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mind {
-    /// Reference: joint positions, rad and m.
-    pub q: [f64; 4],
-    /// Reference: joint speeds, rad/s and m/s.
-    pub qd: [f64; 4],
-    /// State of the cabinet.
-    pub mode: Mode,
-}
-
-impl Mind {
-    /// Before a controller has started.
-    pub const BLANK: Self = Self {
-        q: [0.0; 4],
-        qd: [0.0; 4],
-        mode: Mode::Boot,
-    };
-
-    /// What this node has in mind.
-    pub fn of(node: &Node) -> Self {
-        let controller = node.controller();
-        let four = |v: &nalgebra::Vector4<f32>| [v.x, v.y, v.z, v.w].map(f64::from);
-        Self {
-            q: four(&controller.reference().q),
-            qd: four(&controller.reference().qd),
-            mode: controller.mode(),
         }
     }
 }

@@ -7,15 +7,15 @@ mod program;
 use protocol::codec::{self, Encoder};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, Fault, Hello, Message, Mode, Motion, MotionRequest, Node, Outcome, ParameterReply,
-    ParameterRequest, Refusal, Server, State,
+    Cause, Hello, Message, Mode, Motion, MotionRequest, Node, Outcome, ParameterReply,
+    ParameterRequest, Server, State,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
 
-use crate::model::Payload;
-use crate::peer::{Outbox, Peer, PeerError, World};
+use crate::peer::{Outbox, Peer, PeerError};
 use crate::scenario::Scenario;
+use crate::world::{Hand, OperatorError, World};
 use program::{Action, program};
 
 /// Longest wait for a reply.
@@ -26,80 +26,6 @@ const MODE_LIMIT: Duration = Duration::from_secs(2);
 const MOVE_LIMIT: Duration = Duration::from_secs(120);
 /// Time without any frame after which the controller counts as silent: ten heartbeats.
 const SILENCE_LIMIT: Duration = Duration::from_secs(1);
-
-/// What the operator does by hand, and where a cycle begins and ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Hand {
-    /// Put this into the gripper.
-    Attach(Payload),
-    /// Open the gripper.
-    Release,
-    /// A cycle begins.
-    BeginCycle,
-    /// A cycle has ended, dwell included.
-    EndCycle,
-}
-
-/// Why a run ended early.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum OperatorError {
-    /// The controller refused a request.
-    #[error("{request} refused: {}", sentence(refusal))]
-    Refused {
-        /// Which.
-        request: &'static str,
-        /// Why.
-        refusal: Refusal,
-    },
-    /// Nothing came in time.
-    #[error("the controller is late: {what} did not come within {:.1} s", limit.seconds())]
-    Late {
-        /// What was waited for.
-        what: String,
-        /// For how long.
-        limit: Duration,
-    },
-    /// Nothing comes any more.
-    #[error("the controller is silent since {:.3} s", since.seconds())]
-    Silent {
-        /// When it was heard last.
-        since: Instant,
-    },
-    /// The peers were built from different message tables.
-    #[error(
-        "the controller speaks schema {theirs:08x}, this program {ours:08x}; build both from one source"
-    )]
-    Schema {
-        /// Controller's.
-        theirs: u32,
-        /// Ours.
-        ours: u32,
-    },
-    /// The controller stopped.
-    #[error("the controller went to {mode}: {fault}")]
-    Stopped {
-        /// State it is in.
-        mode: Mode,
-        /// Latched fault.
-        fault: Fault,
-    },
-}
-
-fn sentence(refusal: &Refusal) -> String {
-    let axis = match refusal.axis {
-        0 => " (shoulder)",
-        1 => " (elbow)",
-        2 => " (lift)",
-        3 => " (wrist)",
-        _ => "",
-    };
-    format!(
-        "{}{axis}; value {}, limit {}",
-        refusal.reason.describe(),
-        refusal.value,
-        refusal.limit
-    )
-}
 
 /// Progress of the present action.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,9 +10,7 @@ use std::rc::Rc;
 use protocol::frame::CanFrame;
 use protocol::time::Instant;
 
-use crate::observer::Mind;
-use crate::operator::{Hand, OperatorError};
-use crate::plant::Plant;
+use crate::world::World;
 
 /// Frames that a call sends, each with the time at which it enters the transmit buffer: not before that of the call.
 pub type Outbox = Vec<(Instant, CanFrame)>;
@@ -35,18 +33,6 @@ pub trait Peer {
         world: &mut World,
         out: &mut Outbox,
     ) -> Result<(), PeerError>;
-}
-
-/// What peers share besides the bus: the robot between drives and hands, and what each lets the run know.
-pub struct World {
-    /// The robot. It stands still until somebody moves it on to the present.
-    pub plant: Plant,
-    /// What the controller has in mind.
-    pub mind: Mind,
-    /// What was done by hand in this call.
-    pub hands: Vec<Hand>,
-    /// How the operator's work has ended.
-    pub outcome: Option<Result<(), OperatorError>>,
 }
 
 /// Why a run cannot go on with a peer.

@@ -17,10 +17,12 @@ use protocol::wire::{BitTiming, FrameBits};
 use crate::bus::{BuiltinBus, Delivery, NodeId, Overload, Statistics, Traffic};
 use crate::controller::COMPUTE;
 use crate::model::RobotModel;
-use crate::observer::{Mind, Observer, Pace, PlantState, Truth};
-use crate::operator::OperatorError;
-use crate::peer::{Outbox, Peer, PeerError, World};
+use crate::observer::{Observer, Pace, PlantState, Truth};
+use crate::peer::{Outbox, Peer, PeerError};
 use crate::plant::Plant;
+use crate::world::Mind;
+use crate::world::OperatorError;
+use crate::world::World;
 
 /// Transmit mailboxes of a node: as many as an FDCAN or M_CAN has and more than it needs.
 const MAILBOXES: usize = 32;

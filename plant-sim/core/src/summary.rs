@@ -12,9 +12,9 @@ use serde::Serialize;
 
 use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
 use crate::observer::{Observer, Truth};
-use crate::operator::Hand;
 use crate::rig::{Rig, RunError};
 use crate::setup::RunConfig;
+use crate::world::Hand;
 
 /// Summary of a run, as `summary.json` holds it. Times in s, lengths in mm, shares of 1.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -11,14 +11,16 @@ use protocol::time::{Instant, Period};
 use sim::controller::InProcess;
 use sim::drives::Drives;
 use sim::model::RobotModel;
-use sim::observer::{Mind, Observer};
+use sim::observer::Observer;
 use sim::operator::Operator;
-use sim::peer::{Outbox, Peer, World};
+use sim::peer::{Outbox, Peer};
 use sim::plant::Plant;
 use sim::plant::brake::Brake;
 use sim::rig::Rig;
 use sim::scenario::Scenario;
 use sim::setup::RunConfig;
+use sim::world::Mind;
+use sim::world::World;
 
 const PERIOD: Period = Period::of_rate(1000.0);
 const START: [f64; 4] = [0.2, 1.5, 0.15, 0.3];

@@ -8,12 +8,14 @@ use protocol::time::{Duration, Instant};
 use sim::controller::InProcess;
 use sim::drives::Drives;
 use sim::observer::{Observer, Truth};
-use sim::operator::{Operator, OperatorError};
-use sim::peer::{Outbox, Peer, PeerError, World};
+use sim::operator::Operator;
+use sim::peer::{Outbox, Peer, PeerError};
 use sim::rig::{Rig, RunError, STANDSTILL_LIMIT};
 use sim::run::{in_process, with_controller};
 use sim::scenario::Scenario;
 use sim::setup::RunConfig;
+use sim::world::OperatorError;
+use sim::world::World;
 
 fn gate() -> RunConfig {
     let mut scenario = Scenario::built_in("gate").unwrap();

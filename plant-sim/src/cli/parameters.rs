@@ -11,7 +11,7 @@ use super::show;
 
 /// Arguments of `parameters`.
 #[derive(Args)]
-pub struct ParametersArgs {
+pub(super) struct ParametersArgs {
     /// The bus, with a controller on it: socketcan:INTERFACE, slcan:TERMINAL or slcan:tcp:HOST:PORT.
     #[arg(long, value_name = "BUS", required_unless_present = "markdown")]
     bus: Option<LinkAddress>,
@@ -36,7 +36,7 @@ enum ServerChoice {
 }
 
 /// Lists, or sets.
-pub fn run(args: &ParametersArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &ParametersArgs) -> Result<ExitCode, String> {
     let Some(bus) = &args.bus else {
         show(&parameters::markdown())?;
         return Ok(ExitCode::SUCCESS);

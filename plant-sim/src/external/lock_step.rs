@@ -10,8 +10,9 @@ use protocol::messages::Node as Name;
 use protocol::table;
 use protocol::time::Instant;
 use sim::controller::COMPUTE;
-use sim::observer::Mind;
-use sim::peer::{Outbox, Peer, PeerError, World};
+use sim::peer::{Outbox, Peer, PeerError};
+use sim::world::Mind;
+use sim::world::World;
 
 use super::peers::{self, sender};
 use super::{ANSWER_LIMIT, Remote};

@@ -21,7 +21,7 @@ const MEET_LIMIT: Duration = Duration::from_secs(60);
 
 /// Node that sends this frame, if only one may. A parameter request may come from a tool beside the operator
 /// (`plant-sim parameters`), and makes no second plant.
-pub fn sender(frame: &CanFrame) -> Option<Name> {
+pub(crate) fn sender(frame: &CanFrame) -> Option<Name> {
     table::of_frame(frame)
         .filter(|info| info.id != table::CONTROLLER_PARAMETER_REQUEST.id)
         .and_then(|info| info.sender)

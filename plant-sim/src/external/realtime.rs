@@ -11,8 +11,9 @@ use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{Message, Node as Name};
 use protocol::time::{self, Instant, Period};
-use sim::observer::Mind;
-use sim::peer::{Outbox, Peer, PeerError, World};
+use sim::peer::{Outbox, Peer, PeerError};
+use sim::world::Mind;
+use sim::world::World;
 use trace::difference::Difference;
 
 use super::peers::{self, sender};

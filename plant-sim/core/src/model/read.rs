@@ -4,10 +4,12 @@
 //! a mass matrix is positive definite, a position fits the 32 bits of an encoder. The ranges are wide; what is outside
 //! them is another unit or a slip of the pen, and the message says which.
 
-use std::f64::consts::{PI, TAU};
+mod drive;
+
+use std::f64::consts::PI;
 
 use super::json::{self, Node};
-use super::{DriveTrain, Geometry, JointLimits, Link, ModelError, Payload, RobotModel};
+use super::{Geometry, JointLimits, Link, ModelError, Payload, RobotModel};
 use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
 use crate::maths::hypot;
 
@@ -25,12 +27,6 @@ const ANGULAR_SPEED: Allowed = Allowed::above_zero(1000.0, "rad/s");
 const SPEED: Allowed = Allowed::above_zero(100.0, "m/s");
 const ANY_POSITIVE: Allowed = Allowed::above_zero(1e9, "");
 const ANY_NOT_NEGATIVE: Allowed = Allowed::within(0.0, 1e9, "");
-/// What a Command can carry.
-const MOTOR_TORQUE: Allowed = Allowed::above_zero(200.0, "N m");
-/// What a Feedback can carry, less a quarter for a motor that is driven faster than it may be.
-const MOTOR_SPEED: Allowed = Allowed::above_zero(1600.0, "rad/s");
-/// One count a sample must not read as full speed.
-const FEWEST_COUNTS: f64 = 256.0;
 
 /// Keys that mean something, and those that other programs put into the same file.
 const ROOT: &[&str] = &[
@@ -81,27 +77,6 @@ const LINK: &[&str] = &[
     "lc",
     "comment",
 ];
-const DRIVE: &[&str] = &[
-    "gear_ratio",
-    "ball_screw_lead_m_per_rev",
-    "screw_hand_sign",
-    "rotor_inertia_motor_side",
-    "motor_torque_limit_model",
-    "motor_rated_torque",
-    "motor_max_speed_rad_s",
-    "viscous",
-    "coulomb",
-    "coulomb_tanh_eps",
-    "encoder_counts_per_motor_rev",
-    "comment",
-    "motor_peak_torque",
-    "motor_rated_power_w",
-    "torque_constant_nm_per_arms",
-    "efficiency_info_only",
-    "encoder_multiturn_bits",
-    "gear_stiffness_optional",
-    "gear_damping_ratio_optional",
-];
 const PAYLOAD: &[&str] = &["mass", "com_flange_frame", "inertia_com_diag", "comment"];
 
 pub(super) fn robot(text: &str) -> Result<(RobotModel, Vec<String>), ModelError> {
@@ -118,7 +93,7 @@ pub(super) fn robot(text: &str) -> Result<(RobotModel, Vec<String>), ModelError>
         &root.get("joint_limits", "the limits of the joints")?,
         &mut warnings,
     )?;
-    let drive = drive(
+    let drive = drive::drive(
         &root.get("drive", "the data of motors, gears and friction")?,
         &limits,
         &mut warnings,
@@ -343,74 +318,6 @@ fn check_derived(
         let distance = hypot(link.com[0], link.com[1]);
         if (found.abs() - distance).abs() > SAME {
             warn(&derived, &found, &distance);
-        }
-    }
-    Ok(())
-}
-
-fn drive(
-    node: &Node<'_>,
-    limits: &JointLimits,
-    warnings: &mut Vec<String>,
-) -> Result<DriveTrain, ModelError> {
-    node.warn_of_unknown(DRIVE, warnings);
-    let screw_hand = node.number("screw_hand_sign", Allowed::FINITE)?;
-    if screw_hand.abs() != 1.0 {
-        return Err(node.get("screw_hand_sign", "")?.wrong("1 or -1"));
-    }
-    let counts = node.number("encoder_counts_per_motor_rev", ANY_POSITIVE)?;
-    if counts.fract() != 0.0 || !(FEWEST_COUNTS..=f64::from(i32::MAX)).contains(&counts) {
-        return Err(node.get("encoder_counts_per_motor_rev", "")?.wrong(format!(
-            "a whole number from {FEWEST_COUNTS} to {}",
-            i32::MAX
-        )));
-    }
-    let drive = DriveTrain {
-        gear_ratio: node.numbers("gear_ratio", Allowed::above_zero(1e4, ""))?,
-        screw_lead: node.number("ball_screw_lead_m_per_rev", Allowed::above_zero(1.0, "m"))?,
-        screw_hand,
-        rotor_inertia: node.numbers("rotor_inertia_motor_side", ANY_NOT_NEGATIVE)?,
-        motor_torque_limit: node.numbers("motor_torque_limit_model", MOTOR_TORQUE)?,
-        motor_torque_rated: node.numbers("motor_rated_torque", MOTOR_TORQUE)?,
-        motor_speed_limit: node.numbers("motor_max_speed_rad_s", MOTOR_SPEED)?,
-        viscous: node.numbers("viscous", ANY_NOT_NEGATIVE)?,
-        coulomb: node.numbers("coulomb", ANY_NOT_NEGATIVE)?,
-        coulomb_eps: node.numbers("coulomb_tanh_eps", ANY_POSITIVE)?,
-        encoder_counts: counts as u32,
-    };
-    each(
-        node,
-        "motor_rated_torque",
-        drive.motor_torque_rated,
-        drive.motor_torque_limit,
-        |rated, peak| (rated > peak).then(|| format!("at most the motor's limit, {peak} N m")),
-    )?;
-    check_encoder(node, &drive, limits)?;
-    Ok(drive)
-}
-
-/// Motor positions travel as 32-bit counts: they must hold the whole range of every axis, with as much again beyond it.
-fn check_encoder(
-    node: &Node<'_>,
-    drive: &DriveTrain,
-    limits: &JointLimits,
-) -> Result<(), ModelError> {
-    let reach = |axis: usize| limits.lower[axis].abs().max(limits.upper[axis].abs());
-    let turns_of_nut = reach(2) / drive.screw_lead + reach(3) / TAU;
-    let turns = [
-        reach(0) / TAU * drive.gear_ratio[0],
-        reach(1) / TAU * drive.gear_ratio[1],
-        turns_of_nut * drive.gear_ratio[2],
-        reach(3) / TAU * drive.gear_ratio[3],
-    ];
-    for (turns, axis) in turns.iter().zip(["shoulder", "elbow", "lift", "wrist"]) {
-        let most = (f64::from(i32::MAX) / (2.0 * turns)).floor();
-        if f64::from(drive.encoder_counts) > most {
-            return Err(node
-                .get("encoder_counts_per_motor_rev", "")?
-                .wrong(format!(
-                    "at most {most}: the motor of the {axis} makes {turns:.1} turns to its limit, and its position travels as 32 bits"
-                )));
         }
     }
     Ok(())

@@ -1,0 +1,66 @@
+//! Along the path before anything is timed: reach, limits, and how far each joint travels.
+
+use nalgebra::Vector4;
+use protocol::messages::Refusal;
+
+use super::{Planner, SURVEY_POINTS, Stage, fill};
+use crate::trajectory::capacity::Capacity;
+use crate::trajectory::path::{Path, PathPoint, check_limits};
+use crate::trajectory::profile::Sample;
+use crate::trajectory::request::from_ik;
+
+impl Planner {
+    /// Reach, limits and the largest joint travel per unit of path; at the ends also the accelerations
+    /// from rest that torque allows, a start for the rounds.
+    pub(super) fn survey(
+        &mut self,
+        capacity: &Capacity<'_>,
+        point: u8,
+        fastest: Vector4<f32>,
+    ) -> Result<(), Refusal> {
+        // A path straight in joint space lies between its ends.
+        let points = match self.draft.path {
+            Path::Joint { .. } => 1,
+            Path::Line { .. } => SURVEY_POINTS,
+        };
+        let s = f32::from(point) / f32::from(points);
+        let here = self.point(capacity.arm, s)?;
+        check_limits(capacity.arm, &here.q).map_err(from_ik)?;
+        let limits = &capacity.arm.limits;
+        let fastest = fastest.sup(&here.dq.abs());
+        if point == 0 {
+            capacity.check_creep()?;
+            self.bounds.accelerate = self.acceleration_from_rest(capacity, &here);
+        }
+        if point < points {
+            self.stage = Stage::Survey {
+                point: point + 1,
+                fastest,
+            };
+            return Ok(());
+        }
+        self.bounds.brake = self.acceleration_from_rest(capacity, &here);
+        self.bounds.jerk = fill(&limits.jerk, &fastest);
+        self.bounds.speed = fill(&capacity.speed(), &fastest);
+        if self.bounds.speed == f32::MAX {
+            // Nothing travels along the path: at most the lift of a jump moves.
+            self.bounds.speed = 0.0;
+        }
+        self.stage = if self.gate.is_some() {
+            Stage::Stroke { down: false }
+        } else {
+            Stage::Compose { round: 0 }
+        };
+        Ok(())
+    }
+
+    /// The path acceleration at which a joint at rest reaches its limit of torque or acceleration.
+    pub(super) fn acceleration_from_rest(&self, capacity: &Capacity<'_>, here: &PathPoint) -> f32 {
+        let a = fill(&capacity.arm.limits.acceleration, &here.dq);
+        let along = Sample {
+            a,
+            ..Sample::default()
+        };
+        a * capacity.acceleration_room(here, &along).min(1.0)
+    }
+}
