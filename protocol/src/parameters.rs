@@ -95,7 +95,7 @@ impl Rule {
     /// not a number violates the lower bound.
     pub const fn check(&self, value: f32, period: f32) -> Result<(), f32> {
         let upper = self.upper_at(period);
-        if !(value >= self.lower) {
+        if value.is_nan() || value < self.lower {
             return Err(self.lower);
         }
         if value > upper {

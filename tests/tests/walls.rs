@@ -128,10 +128,12 @@ fn rooms(source: &Path) -> Arrows {
         let room = inside.iter().next().unwrap().to_str().unwrap().to_owned();
         let text = fs::read_to_string(&file).unwrap();
         let text = text.split("#[cfg(test)]").next().unwrap();
-        let code = text
+        let code: Vec<&str> = text
             .lines()
-            .filter(|line| !line.trim_start().starts_with("//"));
-        let named = code.flat_map(names_after_crate).filter(|to| *to != room);
+            .filter(|line| !line.trim_start().starts_with("//"))
+            .collect();
+        let named = names_after_crate(&code.join("\n"));
+        let named = named.into_iter().filter(|to| *to != room);
         arrows.entry(room.clone()).or_default().extend(named);
     }
     arrows.remove("lib");
@@ -142,14 +144,15 @@ fn rooms(source: &Path) -> Arrows {
     arrows
 }
 
-/// The module in each `crate::module` of a line.
-fn names_after_crate(line: &str) -> Vec<String> {
-    let names = line.split("crate::").skip(1).map(|rest| {
+/// The module in each `crate::module` of a text.
+fn names_after_crate(code: &str) -> Vec<String> {
+    let names = code.split("crate::").skip(1).map(|rest| {
         // Groups at the crate are of its own items, not of modules.
-        let group = rest.strip_prefix('{');
+        let group = rest.strip_prefix('{').map(str::trim_start);
         assert!(
             group.is_none_or(|items| items.starts_with(|c: char| c.is_ascii_uppercase())),
-            "one import a module: {line}"
+            "one import for each module: {}",
+            rest.lines().next().unwrap_or_default()
         );
         let of_name = |c: &char| c.is_ascii_alphanumeric() || *c == '_';
         rest.chars().take_while(of_name).collect()
