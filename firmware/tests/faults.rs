@@ -51,7 +51,7 @@ fn latch(latch: Latch) -> &'static str {
     }
 }
 
-/// Who notices, for the docs; no code depends on it.
+/// What detects it, for the docs; no code depends on it.
 fn seen_by(cause: Cause) -> &'static str {
     match cause {
         Cause::SelfTest => "known answers of mathematics, kinematics and CRC; ranges of the model",
@@ -66,7 +66,7 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::EStop => "emergency stop on the bus",
         Cause::DriveFault => "status of the drives",
         Cause::EncoderFault => "status of the drives; a jump no axis can make",
-        other => panic!("{other} is in the table: say who notices it"),
+        other => panic!("{other} is in the table: say what detects it"),
     }
 }
 

@@ -144,7 +144,7 @@ proptest! {
         }
     }
 
-    /// An arm that stands on a limit can be told to go where it stands.
+    /// An arm on a limit can be asked to stay where it is.
     #[test]
     fn pose_on_a_limit_has_a_solution(arm in real_arm(), inside in position(), on_upper: [bool; 4], which in 1..16u8) {
         let mut q = inside;

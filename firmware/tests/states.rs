@@ -13,7 +13,7 @@ use protocol::time::Period;
 #[path = "common/table.rs"]
 mod table;
 
-/// The letters of [`EXPECTED`]: what the drives are told.
+/// The letters of [`EXPECTED`]: what goes to the drives.
 fn word(letter: char) -> ControlWord {
     let torque = ControlWord::TORQUE_ENABLE;
     let released = torque | ControlWord::BRAKE_RELEASE;

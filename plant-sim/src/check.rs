@@ -1,7 +1,7 @@
 //! Judges a trace by the rules of the protocol.
 //!
 //! - Time does not run backwards.
-//! - Every frame of ours is one that the codec accepts: format, length, CRC, codes, ranges.
+//! - Every known frame is one that the codec accepts: format, length, CRC, codes, ranges.
 //! - Every end-to-end counter counts one up; so does the sample number of the feedback. A node that network management
 //!   resets starts anew.
 //! - A command echoes the newest feedback, and no feedback waits for its command until the next.
@@ -94,7 +94,7 @@ pub enum Offence {
         limit_us: u64,
     },
     /// Torque without torque enabled.
-    #[error("Command: motor {motor} shall give {torque} N m while torque is not enabled")]
+    #[error("Command: motor {motor} is commanded {torque} N m while torque is not enabled")]
     TorqueDisabled {
         /// Motor, 0 to 3.
         motor: usize,
@@ -102,7 +102,7 @@ pub enum Offence {
         torque: f32,
     },
     /// Torque beyond a motor's limit.
-    #[error("Command: motor {motor} shall give {torque} N m; {limit} N m are allowed")]
+    #[error("Command: motor {motor} is commanded {torque} N m; limit {limit} N m")]
     TorqueLimit {
         /// Motor, 0 to 3.
         motor: usize,
@@ -136,7 +136,7 @@ pub struct Checker {
 /// How much was judged, and how much was not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Frames of ours.
+    /// Known frames.
     pub judged: u64,
     /// Frames of identifiers that are not ours.
     pub foreign: u64,
@@ -238,7 +238,7 @@ impl Checker {
             if let (Some(seen_us), Some(limit_us)) = (watch.seen_us, watch.limit_us)
                 && now_us - seen_us > limit_us
             {
-                // Told once; the next frame begins anew.
+                // Reported once; the next frame begins anew.
                 watch.seen_us = None;
                 return Err(Offence::Age {
                     message: watch.info.name,

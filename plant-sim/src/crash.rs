@@ -80,7 +80,7 @@ impl Planted {
 /// What was seen of one fault.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seen {
-    /// What the board told when it had started again.
+    /// What the board reported after its restart.
     pub stop: Option<Stop>,
     /// Reasons in the heartbeats since.
     pub reasons: Vec<ResetReason>,

@@ -59,7 +59,7 @@ pub enum EvalError {
     #[error("the controller refuses the model: {0}")]
     Model(firmware::mechanics::arm::ModelError),
     /// A column that the table does not have.
-    #[error("line 1: unknown column {column:?}; allowed are {allowed}")]
+    #[error("line 1: unknown column {column:?}; allowed: {allowed}")]
     UnknownColumn {
         /// Its name.
         column: String,
@@ -67,7 +67,7 @@ pub enum EvalError {
         allowed: String,
     },
     /// A column that occurs twice.
-    #[error("line 1: column {column} occurs twice; allowed is once")]
+    #[error("line 1: column {column} occurs twice; allowed: once")]
     RepeatedColumn {
         /// Its name.
         column: String,
@@ -82,7 +82,7 @@ pub enum EvalError {
     },
     /// A cell that is empty, or holds something else than a number.
     #[error(
-        "line {line}, column {column}: found {found:?}; allowed is a finite number of magnitude up to {max:e}"
+        "line {line}, column {column}: found {found:?}; allowed: a finite number of magnitude up to {max:e}"
     )]
     Value {
         /// Line of the row.
@@ -95,7 +95,7 @@ pub enum EvalError {
         max: f64,
     },
     /// A row longer than the header.
-    #[error("line {line}: {found} values; allowed are the header's {allowed}")]
+    #[error("line {line}: {found} values; allowed: the header's {allowed}")]
     TooManyValues {
         /// Line of the row.
         line: usize,
@@ -167,7 +167,7 @@ pub fn eval(
 }
 
 /// The cells of one line. A table of numbers has no cell of several lines, so lines are split here and not by the CSV
-/// reader: what is wrong can then be told with its line. A blank line has no cells.
+/// reader: errors can then name their line. A blank line has no cells.
 fn split(line: &str) -> Vec<String> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)

@@ -45,7 +45,7 @@ pub(crate) struct Remote {
     /// Whether a controller has been met. From then on a lost link does not end the run: to the other nodes the controller
     /// has fallen silent.
     met: bool,
-    /// Why the link is of no use any more.
+    /// Why the link failed.
     lost: Option<String>,
 }
 

@@ -195,7 +195,7 @@ impl Player {
         Ok(())
     }
 
-    /// Lets time pass, and with it the frames of others: who plays does not listen, but what is not taken piles up.
+    /// Lets time pass, and with it the frames of others: discards received frames so that the socket does not fill.
     fn idle(&mut self, time: Duration) -> Result<(), PlayError> {
         let begun = Instant::now();
         loop {

@@ -15,7 +15,7 @@ use sim::observer::{Observer, Pace};
 /// Between two looks for a client.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Those who watch the bus of a run. As an observer they see its frames; as a pace they hold the run until the first of
+/// Viewers of the bus of a run. As an observer they see its frames; as a pace they hold the run until the first of
 /// them is there, and then to the speed of the clock, so that a person can follow it.
 #[derive(Clone)]
 pub struct Viewers {

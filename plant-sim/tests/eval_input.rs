@@ -89,13 +89,13 @@ fn a_bad_header_is_told_with_what_is_allowed() {
     );
     assert_eq!(
         refusal("x,y,x,z,yaw\n"),
-        "line 1: column x occurs twice; allowed is once"
+        "line 1: column x occurs twice; allowed: once"
     );
 }
 
 #[test]
 fn a_bad_cell_is_told_with_its_line_and_column() {
-    let allowed = "allowed is a finite number of magnitude up to 1.7976931348623157e308";
+    let allowed = "allowed: a finite number of magnitude up to 1.7976931348623157e308";
     for (cell, found) in [
         ("1,5", None),
         ("", Some("")),
@@ -129,7 +129,7 @@ fn the_controller_is_not_asked_for_what_it_cannot_represent() {
     let message = run(Table::Ik, By::Lagrange, input).unwrap_err();
     assert_eq!(
         message,
-        "line 2, column x: found \"1e300\"; allowed is a finite number of magnitude up to 3.4028234663852886e38"
+        "line 2, column x: found \"1e300\"; allowed: a finite number of magnitude up to 3.4028234663852886e38"
     );
     assert!(
         run(Table::Ik, By::Lagrange, "x,y,z,yaw\n1e38,1e38,0,0\n")

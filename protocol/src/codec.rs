@@ -1,6 +1,6 @@
 //! Message to frame and back.
 //!
-//! postcard reads malleable input: trailing bytes, overlong integers, numbers that are none. Decoding therefore goes on
+//! postcard reads malleable input: trailing bytes, overlong integers, NaN. Decoding therefore goes on
 //! after it, and in this order: identifier, format and length; CRC; postcard; padding zero and re-encoding equal to the
 //! input, so that each message has exactly one frame; every float finite and within its range. A frame that fails
 //! anywhere yields an error and nothing else. The counter is judged outside, by [`Receiver`](crate::e2e::Receiver),
@@ -59,7 +59,7 @@ pub enum ValueError {
     },
 }
 
-/// Why a message was not made a frame.
+/// Why encoding failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EncodeError {
@@ -69,7 +69,7 @@ pub enum EncodeError {
     TooLong,
 }
 
-/// Why a frame is no message.
+/// Why decoding failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DecodeError {
@@ -88,9 +88,9 @@ pub enum DecodeError {
     Crc,
     /// A code or bit without meaning.
     Malformed,
-    /// Padding or an encoding that no sender of ours makes.
+    /// Padding or an encoding that is not canonical.
     NotCanonical,
-    /// A float that is none, or out of range.
+    /// Not a finite number, or out of range.
     Value(ValueError),
 }
 
@@ -267,7 +267,7 @@ fn check_values(message: &Message, info: &MessageInfo, body: &[u8]) -> Result<()
     check_by_table(info, body)
 }
 
-// Out of line, as it is rarely come by in a sample.
+// Out of line: rarely reached in a sample.
 #[inline(never)]
 fn check_by_table(info: &MessageInfo, body: &[u8]) -> Result<(), ValueError> {
     let mut selected = None;
@@ -325,10 +325,7 @@ impl fmt::Display for ValueError {
                 min,
                 max,
             } => {
-                write!(
-                    f,
-                    "{signal} {element} is {value}, allowed is {min} to {max}"
-                )
+                write!(f, "{signal} {element} is {value}; allowed: {min} to {max}")
             }
         }
     }
@@ -349,11 +346,11 @@ impl fmt::Display for DecodeError {
             Self::UnknownId => f.write_str("identifier of no message"),
             Self::WrongKind => f.write_str("wrong frame format"),
             Self::WrongLength { found, expected } => {
-                write!(f, "{found} bytes, expected are {expected}")
+                write!(f, "{found} bytes, expected {expected}")
             }
             Self::Crc => f.write_str("end-to-end CRC is wrong"),
             Self::Malformed => f.write_str("code or bit without meaning"),
-            Self::NotCanonical => f.write_str("padding or encoding of no sender of ours"),
+            Self::NotCanonical => f.write_str("non-canonical padding or encoding"),
             Self::Value(value) => value.fmt(f),
         }
     }

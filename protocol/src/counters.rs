@@ -19,9 +19,9 @@ pub struct Counters {
     pub crc: u16,
     /// Code or bit without meaning.
     pub malformed: u16,
-    /// Padding or encoding of no sender of ours.
+    /// Non-canonical padding or encoding.
     pub not_canonical: u16,
-    /// Float that is none.
+    /// Not a finite number.
     pub not_finite: u16,
     /// Float out of its range.
     pub out_of_range: u16,
@@ -29,7 +29,7 @@ pub struct Counters {
     pub duplicate: u16,
     /// Older than one received before.
     pub stale: u16,
-    /// Never received, as the counter of the next one told. Not a frame dropped: not in [`Self::dropped`].
+    /// Missing, judged by the gap in the next counter. Not a frame dropped: not in [`Self::dropped`].
     pub lost: u16,
 }
 
@@ -49,7 +49,7 @@ impl Counters {
         *count = count.saturating_add(1);
     }
 
-    /// Counts what the counter of a frame told.
+    /// Counts one verdict.
     pub const fn judge(&mut self, verdict: Verdict) {
         match verdict {
             Verdict::Initial | Verdict::Fresh => {}

@@ -69,7 +69,7 @@ pub enum Line {
     AutoPoll(bool),
 }
 
-/// Why a line says nothing. It is dropped up to its carriage return; the next line is read afresh.
+/// Why a line was refused. It is dropped up to its carriage return; parsing restarts at the next line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SlcanError {
@@ -77,7 +77,7 @@ pub enum SlcanError {
     UnknownCommand(u8),
     /// The line is longer or shorter than the command and its length code say.
     WrongLength,
-    /// The byte at this place, counted from 0, is no hex digit.
+    /// The byte at this position, counted from 0, is not a hex digit.
     NotHex {
         /// Place.
         at: usize,

@@ -194,7 +194,7 @@ fn every_cause_is_counted_once() {
     assert_eq!((counters.crc, counters.dropped()), (u16::MAX, u16::MAX));
 }
 
-/// The table says which profile each identifier has; a frame of the other one is no frame of ours.
+/// The table says which profile each identifier has; a frame with the other one is not a message.
 #[test]
 fn a_frame_moved_to_another_identifier_is_refused() {
     for node in Node::ALL {

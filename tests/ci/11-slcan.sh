@@ -20,7 +20,7 @@ serve() {
 interrupt() { kill -INT $process && wait $process || fail "Ctrl-C did not end the controller cleanly"; }
 plant() { timeout 90 "$plant_sim" run --cycles 1 "$@"; }
 
-# --- two processes, in lock-step: the same bytes twice, whoever listens
+# --- two processes, in lock-step: the same bytes twice, whichever end listens
 serve controller
 plant --bus "slcan:tcp:127.0.0.1:$port" --controller external --out one >one.txt 2>one.err
 interrupt
@@ -32,7 +32,7 @@ wait $process || fail "run of a plant that listens"
 cmp one/trace.log two/trace.log
 echo "ok: two processes over slcan, $(wc -l <one/trace.log) frames, the same bytes in two runs"
 
-# --- another robot, told to both; the run itself compares the controller with its twin, byte for byte
+# --- another robot, known to both; the run itself compares the controller with its twin, byte for byte
 robot=$root/plant-sim/models/irb930-12-0.85.json
 "$plant_sim" model "$robot" --out robot.json
 small() { plant --model "$robot" --bus "slcan:tcp:127.0.0.1:$port" --controller external --out small; }
@@ -44,7 +44,7 @@ refused "differs from its twin" small
 interrupt
 port=$((port + 1))
 refused "write one with: plant-sim model" "$controller" --bus "slcan:listen:127.0.0.1:$port" --model "$robot"
-echo "ok: a controller told another robot moves it; one that was not is found out"
+echo "ok: a controller configured for another robot moves it; one that was not is found out"
 
 # --- python-can watches the built-in bus
 port=$((port + 1))

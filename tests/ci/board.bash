@@ -12,7 +12,7 @@ board() { tests/board/cargo build --release --quiet --locked --package "$@"; }
 # built PACKAGE [ARGS]: the same; prints where cargo has put it.
 built() { board "$@" --message-format=json-render-diagnostics | grep -o '"executable":"[^"]*"' | tail -1 | cut -d'"' -f4; }
 
-# still_runs PID: a zombie has ended; whoever adopted it has yet to notice.
+# still_runs PID: a zombie has ended; its parent has yet to notice.
 still_runs() { grep -q '^State:.*[^Z] (' "/proc/$1/status" 2>/dev/null; }
 
 # ends_with_its_run SECONDS ARGS: a killed `plant-sim run --controller qemu ARGS` leaves no emulator behind.

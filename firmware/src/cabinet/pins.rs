@@ -26,7 +26,7 @@ pub struct Cabinet<Brake, Torque, Green, Red, EStop> {
     pub estop: EStop,
 }
 
-/// A pin did not do what it was told.
+/// A pin did not take the level it was set to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PinFault;

@@ -31,7 +31,7 @@ impl Stop {
     }
 }
 
-/// Seed of the check word, so that memory full of one value is no record.
+/// Seed of the check word, so that memory full of one value does not pass as a record.
 const SEED: u32 = 0x5CA7_A571;
 
 /// A [`Stop`] in memory that a reset leaves alone. After power-on anything may be in it, and a reset may come in the

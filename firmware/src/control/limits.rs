@@ -1,6 +1,6 @@
 //! Torque limits: what a law asks for, cut to what joints and motors can give.
 //!
-//! Limited is not failed: a cut is a flag in the state message and holds the integrals, no more.
+//! Saturation is not a fault: a cut is a flag in the state message and holds the integrals, no more.
 
 use nalgebra::Vector4;
 use protocol::messages::LimitFlags;

@@ -1,4 +1,4 @@
-//! Trips on what the drives report. Saturation is no fault: see [`limits`](super::limits).
+//! Trips on what the drives report. Saturation is not a fault: see [`limits`](super::limits).
 
 use nalgebra::Vector4;
 use protocol::messages::{Cause, DriveStatus, Fault, FaultAxis};

@@ -45,7 +45,7 @@ impl Phase {
     }
 }
 
-/// Is told of every end of a phase.
+/// Called at the end of each phase.
 pub trait Probe {
     /// `phase` has ended; the time since the end before belongs to it.
     fn end(&mut self, phase: Phase);

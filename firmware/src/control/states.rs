@@ -79,7 +79,7 @@ listed! {
     }
 }
 
-/// Every transition: from, on, to. What is not here changes nothing. The samples left of a state are 0 here; who enters it
+/// Every transition: from, on, to. What is not here changes nothing. The samples left of a state are 0 here; the controller, on entering it,
 /// puts in the time that the brake takes.
 pub const TRANSITIONS: [(State, Event, State); 49] = {
     use Event::{

@@ -108,7 +108,7 @@ pub struct DriveTrain {
     pub rotor_inertia: Vector4<f32>,
     /// Greatest motor torque (N m).
     pub motor_torque_limit: Vector4<f32>,
-    /// Motor torque that can be held for ever (N m).
+    /// Continuous rating: motor torque that can be held indefinitely (N m).
     pub motor_torque_rated: Vector4<f32>,
     /// Greatest motor speed (rad/s).
     pub motor_speed_limit: Vector4<f32>,

@@ -42,7 +42,7 @@ impl Trig {
         Self::in_line(q)
     }
 
-    /// As [`Trig::new`], in line, where time is short: what the caller does not look at is not evaluated. Dynamics never ask
+    /// Inlined variant of [`Trig::new`]: components that the caller does not use are optimised away. Dynamics never ask
     /// for theta1.
     #[inline(always)]
     #[must_use]

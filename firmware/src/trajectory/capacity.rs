@@ -168,7 +168,7 @@ impl Capacity<'_> {
         let peak = sqrt(cap * height).min(speed);
         let friction = self.arm.drive.coulomb.z + self.arm.drive.viscous.z * peak;
         let force = self.torque().z;
-        // A stroke that the drive cannot hold has been refused: this keeps one that it hardly can positive.
+        // A stroke that the drive cannot hold has been refused: this keeps the bound positive for one close to the limit.
         let within = |force: f32| clamp(force / mass, 0.01 * cap, cap);
         let up = Bounds {
             speed,

@@ -38,7 +38,7 @@ impl Transmit for Wire {
     }
 }
 
-/// A node, and an arm that stands still whatever it is told; unless it `follows`, and is where the node wants it.
+/// A node, and an arm that stands still whatever the command; unless it `follows`, and is where the node wants it.
 pub(crate) struct Bench {
     pub node: Node,
     pub wire: Wire,

@@ -111,7 +111,7 @@ fn three_bad_feedback_frames_in_a_row_stop_the_arm() {
     assert_eq!(bench.node.controller().cause(), Cause::Corrupted);
 }
 
-/// A frame whose checksum is right and whose shoulder speed is no number.
+/// A frame whose checksum is right and whose shoulder speed is not a number.
 fn not_a_number(good: &CanFrame) -> CanFrame {
     let mut bytes = good.data().to_vec();
     let counter = bytes[bytes.len() - 3];

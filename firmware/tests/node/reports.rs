@@ -92,7 +92,7 @@ fn junk() -> impl Strategy<Value = CanFrame> {
 }
 
 proptest! {
-    /// Frames that are none of ours change nothing: same state, same torques, to the bit.
+    /// Foreign frames change nothing: same state, same torques, to the bit.
     #[test]
     fn junk_changes_nothing(frames in proptest::collection::vec(junk(), 1..30)) {
         // Some random frames are valid e-stops or NMT commands, which carry no protection, and
@@ -107,7 +107,7 @@ proptest! {
     }
 }
 
-/// A probe that notes what it is told.
+/// A probe that records its calls.
 #[derive(Default)]
 struct Marks(Vec<Phase>);
 

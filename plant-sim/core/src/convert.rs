@@ -1,4 +1,4 @@
-//! From the model file, f64, to what the controller is told, f32.
+//! From the model file, f64, to the controller's model, f32.
 
 use firmware::mechanics::arm::{ArmModel, DriveTrain, Geometry, JointLimits, Link, Payload};
 use nalgebra::{Vector3, Vector4};

@@ -6,7 +6,7 @@
 //!   stays there, the usual definition for a motion axis.
 //! - *Tracking error*: true tool to commanded tool at the same instant, while the reference moves.
 //! - *Utilisation*: largest torque or speed over its limit; thermal: root mean square over what
-//!   the motor can hold for ever.
+//!   the continuous rating of the motor.
 
 use serde::Serialize;
 

@@ -58,7 +58,7 @@ pub struct JointLimits {
     pub jerk: [f64; 4],
     /// Largest effort for a short time.
     pub effort: [f64; 4],
-    /// Largest root-mean-square effort for ever.
+    /// Continuous rating: largest root-mean-square effort.
     pub effort_continuous: [f64; 4],
 }
 
@@ -87,7 +87,7 @@ pub struct DriveTrain {
     pub rotor_inertia: [f64; 4],
     /// Torque that the motor gives at most, N m.
     pub motor_torque_limit: [f64; 4],
-    /// Torque that the motor gives for ever, N m.
+    /// Continuous rating: torque that the motor can hold indefinitely, N m.
     pub motor_torque_rated: [f64; 4],
     /// Speed up to which the motor gives its full torque, rad/s.
     pub motor_speed_limit: [f64; 4],
@@ -149,7 +149,7 @@ pub enum ModelErrorKind {
     Wrong {
         /// JSON path, as in `links[2].mass`.
         path: String,
-        /// What stands there.
+        /// What is there.
         found: String,
         /// What is allowed there.
         expected: String,

@@ -1,6 +1,6 @@
 //! The operator on the bus: works off a scenario, one request at a time, and waits for answers.
 //!
-//! It knows the controller by its messages alone. Every wait has a limit and names who is late.
+//! It knows the controller by its messages alone. Every wait has a limit and names what is late.
 
 mod program;
 

@@ -62,7 +62,7 @@ pub struct Source {
     pub text: String,
 }
 
-/// An array of just so many numbers: serde alone would leave what is too much.
+/// An array of exactly so many numbers: serde alone ignores surplus elements.
 fn exactly<'de, D: Deserializer<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<[f64; N], D::Error> {
@@ -206,7 +206,7 @@ fn full() -> f64 {
 /// Why there is no scenario.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
-    /// The text is no scenario; the message names line and key.
+    /// The text is not a scenario; the message names line and key.
     #[error("scenario {origin}: {message}")]
     Parse {
         /// File or name.
@@ -219,7 +219,7 @@ pub enum ScenarioError {
     Value {
         /// File or name.
         origin: String,
-        /// Line and column, counted from 1, where the value stands in the text.
+        /// Line and column, counted from 1, where the value is in the text.
         place: Option<(usize, usize)>,
         /// Key, as in `cycle[2].jump.top`.
         key: String,

@@ -16,14 +16,14 @@ pub struct LawChoice {
     pub compensation: Compensation,
 }
 
-/// A name that is no control law.
+/// A name that is not a control law.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LawError {
     /// No such law.
-    #[error("no control law '{0}'; there are {list}", list = names())]
+    #[error("no control law '{0}'; allowed: {list}", list = names())]
     Law(String),
     /// No such compensation.
-    #[error("no compensation '{0}'; there are none, integral, observer")]
+    #[error("no compensation '{0}'; allowed: none, integral, observer")]
     Compensation(String),
     /// Only the computed-torque laws take one.
     #[error("{0} takes no compensation; only computed-torque and computed-torque-task do")]

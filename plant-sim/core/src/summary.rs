@@ -89,9 +89,9 @@ pub struct Fault {
     pub description: &'static str,
     /// Axis, if one is concerned.
     pub axis: Option<&'static str>,
-    /// What was found; 0 if that is no number.
+    /// What was found; 0 if that is not a number.
     pub value: f32,
-    /// What is allowed; 0 if that is no number.
+    /// What is allowed; 0 if that is not a number.
     pub limit: f32,
     /// Unit of value and limit.
     pub unit: &'static str,

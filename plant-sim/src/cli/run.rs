@@ -65,7 +65,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "slcan:tcp:HOST:PORT")]
     listen: Option<LinkAddress>,
     /// The robot that the controller believes in (a model file); also the true one, unless
-    /// --plant-model says otherwise. An external controller is told the same: plant-sim model FILE.
+    /// --plant-model says otherwise. Configure an external controller alike: plant-sim model FILE.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// The robot as it is (a model file).

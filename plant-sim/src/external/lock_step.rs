@@ -94,7 +94,7 @@ impl LockStep {
         format!("at {}.{:03} s", ms / 1000, ms % 1000)
     }
 
-    /// What a controller says when it starts cannot be told from what it said before: the twin says it.
+    /// What a controller says when it starts cannot be distinguished from what it said before: the twin says it.
     fn start(&mut self, now: Instant) {
         self.twin.call(now, None);
         self.sent.extend(self.twin.due().drain(..));

@@ -1,4 +1,4 @@
-//! Who else is on the bus: no other plant, and one controller.
+//! Peers on the bus: no other plant, and one controller.
 
 use std::time::{Duration, Instant};
 

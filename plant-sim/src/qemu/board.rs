@@ -45,7 +45,7 @@ const LOG: &str = "log";
 /// A running board.
 #[derive(Debug)]
 pub(super) struct Board {
-    /// What it is told at every start.
+    /// What is sent to it at every start.
     setup: [u8; SETUP_LEN],
     /// `None` once the channel is closed.
     requests: Option<ChildStdin>,
@@ -210,7 +210,7 @@ impl Board {
         self.answer(sent)
     }
 
-    /// Asks for what has no answer: the board is to start again.
+    /// Sends a request that has no answer: the board restarts.
     pub(super) fn tell(&mut self, request: &Request) -> Result<(), PeerError> {
         self.say(&request.to_bytes())
     }

@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    /// What a board says, and what it was told.
+    /// What a board says, and what was sent to it.
     struct Script(io::Cursor<Vec<u8>>, Vec<u8>);
 
     impl Read for Script {

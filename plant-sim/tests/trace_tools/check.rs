@@ -109,7 +109,7 @@ fn every_rule_is_told_where_it_is_broken() {
     for (records, index, offence) in cases {
         assert_eq!(check(&records), Some((index, offence)));
     }
-    // A sample number that skips while the counter does not: a sender that is not one of ours.
+    // A sample number that skips while the counter does not: a foreign sender.
     let skipping = Feedback {
         sample: 7,
         status: DriveStatus::READY,

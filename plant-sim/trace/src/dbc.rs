@@ -13,7 +13,7 @@ use protocol::table::{self, TABLE};
 
 use crate::fields::full_name;
 
-/// Node that stands for none or any.
+/// Stands for no node or any node.
 const ANYBODY: &str = "Vector__XXX";
 /// Cycle time of what is sent every sample, ms: the bench's default rate of 1 kHz.
 const SAMPLE_MS: u32 = 1;
@@ -235,7 +235,7 @@ fn message(text: &mut String, info: &MessageInfo) {
     }
 }
 
-/// Who listens: the receiver, or all but the sender.
+/// Receivers: the one named, or all but the sender.
 fn receivers(info: &MessageInfo) -> String {
     let listens = |node: &Node| match info.receiver {
         Some(receiver) => *node == receiver,

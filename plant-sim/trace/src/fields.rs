@@ -22,7 +22,7 @@ impl Decoded {
     /// Takes a frame apart.
     ///
     /// # Errors
-    /// The frame is no message, or not as a sender of ours makes it.
+    /// The frame does not decode, or is not canonical.
     pub fn new(frame: &CanFrame) -> Result<Self, DecodeError> {
         let counter = codec::decode(frame)?.counter;
         let info = table::of_frame(frame).ok_or(DecodeError::UnknownId)?;

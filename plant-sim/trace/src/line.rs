@@ -77,7 +77,7 @@ pub enum Problem {
     Hex {
         /// Byte of the line, counted from 1.
         column: usize,
-        /// What stands there.
+        /// What is there.
         found: char,
     },
     /// Half a byte at the end.
@@ -313,7 +313,7 @@ fn fd_frame(id: Id, text: Text<'_>) -> Result<CanFrame, Problem> {
 /// An FD frame of exactly this data.
 pub(super) fn fd(id: Id, data: &[u8], brs: bool, esi: bool) -> Result<CanFrame, Problem> {
     let found = data.len();
-    // The frame would pad to the next length: a log holds the frame as it was, so another length is no frame.
+    // The frame would pad to the next length: a log holds the frame as it was, so no frame has another length.
     if fd_length(found) != Some(found) {
         return Err(Problem::Length {
             found,

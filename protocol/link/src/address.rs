@@ -21,11 +21,11 @@ pub enum SlcanPeer {
     Terminal(PathBuf),
     /// TCP server, host and port.
     Tcp(String),
-    /// Whoever connects to this TCP port: see [`SlcanHub`](super::SlcanHub).
+    /// All clients of this TCP port: see [`SlcanHub`](super::SlcanHub).
     Listen(String),
 }
 
-/// The text is no address of a bus.
+/// The text is not the address of a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AddressError {
     /// What was typed.
@@ -36,7 +36,7 @@ impl fmt::Display for AddressError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{:?} is no bus; allowed: socketcan:INTERFACE (socketcan:can0), slcan:TERMINAL (slcan:/dev/ttyACM0), \
+            "{:?} is not a bus; allowed: socketcan:INTERFACE (socketcan:can0), slcan:TERMINAL (slcan:/dev/ttyACM0), \
              slcan:tcp:HOST:PORT (slcan:tcp:localhost:29536), slcan:listen:HOST:PORT (slcan:listen:localhost:29536)",
             self.text
         )

@@ -81,7 +81,7 @@ impl fmt::Display for LinkError {
                 } else {
                     write!(
                         f,
-                        "If its controller can FD: ip link set {name} type can bitrate 1000000 dbitrate 5000000 fd on"
+                        "If its controller supports FD: ip link set {name} type can bitrate 1000000 dbitrate 5000000 fd on"
                     )
                 }
             }

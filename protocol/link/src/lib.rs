@@ -47,7 +47,7 @@ pub enum Link {
     SocketCan(SocketCan),
     /// A serial line.
     Slcan(Box<SlcanPort>),
-    /// The serial lines of whoever connects.
+    /// The serial lines of all that connect.
     SlcanHub(SlcanHub),
 }
 

@@ -23,7 +23,7 @@ const CLIENTS: usize = 16;
 const QUEUE: usize = 4096 * MAX_LINE;
 /// Frames that may wait for this node; a buffer of each client more, and no client is read.
 const RECEIVED: usize = 4096;
-/// Hardware and software version that clients are told.
+/// Hardware and software version reported to clients.
 const VERSION: Line = Line::VersionIs([0x10, 0x10]);
 /// Serial number that clients are told.
 const SERIAL_NUMBER: Line = Line::SerialNumberIs(*b"0001");
@@ -61,7 +61,7 @@ pub enum Clients {
     Watch,
 }
 
-/// A listening port, with all who came.
+/// A listening port with its clients.
 #[derive(Debug)]
 pub struct SlcanHub {
     listener: TcpListener,
@@ -108,20 +108,20 @@ impl SlcanHub {
             .any(|client| client.part != Part::Closed)
     }
 
-    /// Frames that clients who did not read have lost.
+    /// Frames dropped for slow readers.
     #[must_use]
     pub fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// Moves bytes both ways, and greets who has come, without waiting.
+    /// Moves bytes both ways and accepts new clients, without waiting.
     pub fn exchange(&mut self) {
         // No more at once than there may be: a flood of callers must not keep the bus waiting.
         for _ in 0..CLIENTS {
             let Ok((stream, _)) = self.listener.accept() else {
                 break;
             };
-            // Small lines must not wait for each other. Who cannot be set up so is turned away.
+            // Small lines must not wait for each other. A client that cannot be configured is refused.
             if self.clients.len() < CLIENTS
                 && stream.set_nonblocking(true).is_ok()
                 && stream.set_nodelay(true).is_ok()

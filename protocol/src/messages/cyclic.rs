@@ -47,14 +47,14 @@ bits! {
 pub struct Command {
     /// Sample of the feedback that this answers.
     pub sample: u32,
-    /// What the drives shall switch.
+    /// Switch commands for the drives.
     pub control: ControlWord,
     /// Torque, N m, per motor.
     pub torque: [f32; 4],
 }
 
 bits! {
-    /// What the drives shall switch.
+    /// Switch commands for the drives.
     pub struct ControlWord: u8 {
         /// Power stage on; without it the motors are free of torque whatever is asked for.
         TORQUE_ENABLE = 0, "torque-enable";
@@ -75,7 +75,7 @@ pub struct State {
     pub mode: Mode,
     /// First cause of the latched fault, or none.
     pub cause: Cause,
-    /// Saturations since the last report. Limited is not failed.
+    /// Saturations since the last report; a saturation is not a fault.
     pub limits: LimitFlags,
     /// Motions accepted and not yet completed.
     pub queue: u8,
@@ -101,7 +101,7 @@ pub struct State {
     pub fault_axis: FaultAxis,
     /// Value that led to the latched fault, in the unit of [`Fault::unit`].
     pub fault_value: f32,
-    /// What is allowed instead, in the same unit; 0 if that is no number.
+    /// What is allowed instead, in the same unit; 0 if that is not a number.
     pub fault_limit: f32,
 }
 

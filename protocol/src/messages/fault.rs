@@ -45,7 +45,7 @@ pub struct Fault {
     pub axis: FaultAxis,
     /// What was found, in [`Fault::unit`].
     pub value: f32,
-    /// What is allowed, in the same unit; 0 if that is no number.
+    /// What is allowed, in the same unit; 0 if that is not a number.
     pub limit: f32,
 }
 

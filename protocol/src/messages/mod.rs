@@ -1,4 +1,4 @@
-//! One struct a message; which identifier, length and signals it has stands in [`table`](crate::table).
+//! One struct per message; its identifier, length and signals are in [`table`](crate::table).
 //!
 //! Axis order is shoulder, elbow, lift, wrist. Quantities are SI. Motor quantities are those of the motor shafts,
 //! before gears and the coupling of lift and wrist; joint quantities follow `[theta1, theta2, d3, theta4]`, lift
@@ -32,7 +32,7 @@ pub enum Message {
     Emergency(Node, Emergency),
     /// Drives to controller: what the motors did in the last sample.
     Feedback(Feedback),
-    /// Controller to drives: what the motors shall do.
+    /// Controller to drives: motor commands.
     Command(Command),
     /// Operator to controller: a request.
     Motion(Motion),

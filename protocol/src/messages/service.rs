@@ -73,7 +73,7 @@ pub struct EStop {
 pub struct EStopReason(pub u8);
 
 impl EStopReason {
-    /// Not told, as in an empty frame.
+    /// Not given, as in an empty frame.
     pub const UNSPECIFIED: Self = Self(0);
     /// A person pressed a button.
     pub const BUTTON: Self = Self(1);
@@ -205,7 +205,7 @@ codes! {
         Corrupted = 5, "corrupted";
         /// Another node sends on our peer's identifier, or a log is replayed. Reserved: not raised yet.
         DuplicateNode = 6, "duplicate-node";
-        /// A position stands still although the axis must be moving. Reserved: not raised yet.
+        /// A position does not change while the axis moves. Reserved: not raised yet.
         StuckSensor = 7, "stuck-sensor";
         /// A node floods the bus. Reserved: not raised yet.
         Babbling = 8, "babbling";

@@ -88,11 +88,11 @@ grep -q "commands unlike the twin's" real.err || fail "real time: no report"
 kill -INT $controller; wait $controller || fail "real-time controller did not end cleanly"
 passed "real time over vcan0: $(grep -c ' 240##' real/trace.log) commands"
 
-# --- what is no bus is said so
+# --- a text that is not a bus address is refused
 no_bus() { refused "$1" timeout 20 "$bin/controller" --bus "$2"; } # no_bus TEXT BUS
 no_bus "there is no interface vcan7; CAN interfaces here: vcan0" socketcan:vcan7
 no_bus "lo is not a CAN interface" socketcan:lo
-no_bus "is no bus; allowed" vcan0
+no_bus "is not a bus; allowed" vcan0
 if ip link add dev vcan1 type vcan 2>/dev/null; then
     ip link set vcan1 mtu 16 up
     no_bus "vcan1 carries classical CAN only (MTU 16)" socketcan:vcan1

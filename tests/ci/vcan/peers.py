@@ -1,7 +1,7 @@
 """peers.py BIN WORK: the checks of 12-peers.sh, on a machine with vcan0.
 
 Frames are compared completely, except for when they came: nothing depends on how fast the machine is. A virtual bus takes
-frames faster than programs read them, so whoever receives gets room for all of them.
+frames faster than programs read them, so each receiver gets room for all of them.
 """
 
 import fcntl

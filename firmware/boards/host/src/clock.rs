@@ -55,7 +55,7 @@ impl Clock {
         }
     }
 
-    /// A node starts at 0 in lock-step, whoever asked for it: what follows is the same in every run.
+    /// A node starts at 0 in lock-step, whatever the cause: what follows is the same in every run.
     pub(crate) fn restart(&mut self) {
         if let Self::LockStep {
             clock,

@@ -75,7 +75,7 @@ fn load(path: &Path) -> Result<ArmModel, String> {
     let name = path.display();
     let text = fs::read_to_string(path).map_err(|error| format!("cannot read {name}: {error}"))?;
     let arm: ArmModel = serde_json::from_str(&text).map_err(|error| {
-        format!("{name} is no robot of a controller: {error}; write one with: plant-sim model FILE")
+        format!("{name} is not a robot file of the controller: {error}; write one with: plant-sim model FILE")
     })?;
     arm.validate().map_err(|error| format!("{name}: {error}"))?;
     Ok(arm)

@@ -7,6 +7,7 @@ mod pins;
 mod stack;
 mod uart;
 
+use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
 use channel::{
@@ -47,15 +48,20 @@ const SYST_MAX: u32 = 0x00FF_FFFF;
 #[entry]
 fn main() -> ! {
     // Static, so that the stack holds calls only. The attribute hands these out once, as references.
-    static mut SETUP: Option<Setup> = None;
-    static mut NODE: Option<Node> = None;
+    // Not an `Option`, whose `None` need not be zeros and then takes its size in flash.
+    static mut SETUP: MaybeUninit<Setup> = MaybeUninit::uninit();
+    static mut NODE: MaybeUninit<Node> = MaybeUninit::uninit();
     static mut REPLY: Reply = Reply::new();
     cortex_m4::guard();
     uart::LOG.start();
     host::exit(start(SETUP, NODE, REPLY))
 }
 
-fn start(setup: &mut Option<Setup>, node: &mut Option<Node>, reply: &mut Reply) -> Result<(), End> {
+fn start(
+    setup: &mut MaybeUninit<Setup>,
+    node: &mut MaybeUninit<Node>,
+    reply: &mut Reply,
+) -> Result<(), End> {
     let mut core = cortex_m::Peripherals::take().ok_or(End)?;
     start_timer(&mut core.SYST);
     let input = File::open(TO_BOARD)?;
@@ -86,15 +92,15 @@ fn start(setup: &mut Option<Setup>, node: &mut Option<Node>, reply: &mut Reply) 
 // Three steps out of line: each begins with the stack that the one before has given back.
 
 #[inline(never)]
-fn receive<'a>(input: &File, slot: &'a mut Option<Setup>) -> Result<&'a Setup, End> {
+fn receive<'a>(input: &File, slot: &'a mut MaybeUninit<Setup>) -> Result<&'a Setup, End> {
     let mut record = [0; SETUP_LEN];
     input.read(&mut record)?;
-    Ok(slot.insert(Setup::from_bytes(&record).ok_or(End)?))
+    Ok(slot.write(Setup::from_bytes(&record).ok_or(End)?))
 }
 
 #[inline(never)]
-fn build<'a>(config: &Config, reset: ResetReason, slot: &'a mut Option<Node>) -> &'a mut Node {
-    slot.insert(Node::new(*config, reset))
+fn build<'a>(config: &Config, reset: ResetReason, slot: &'a mut MaybeUninit<Node>) -> &'a mut Node {
+    slot.write(Node::new(*config, reset))
 }
 
 /// Answers until the host goes away.

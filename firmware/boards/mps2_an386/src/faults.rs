@@ -38,7 +38,7 @@ mod planted {
                     asm::isb();
                 }
             }
-            // Whoever gets here has found a fault that is none.
+            // Reaching this line means the fault did not trap.
             Err(End)
         }
     }
@@ -48,7 +48,7 @@ mod planted {
         overflow(0);
     }
 
-    /// Calls itself for ever. Each call has something to do after the next one, so that it is no loop.
+    /// Calls itself without end. Each call has something left to do after the next one, so that the compiler cannot make it a loop.
     #[inline(never)]
     #[expect(unconditional_recursion)]
     fn overflow(depth: u32) -> u32 {

@@ -4,6 +4,8 @@ mod can;
 mod clock;
 mod safe;
 
+use core::mem::MaybeUninit;
+
 use core::sync::atomic::Ordering;
 
 use cortex_m::peripheral::DWT;
@@ -30,7 +32,8 @@ defmt::timestamp!("{=u32:ms}", clock::TICKS.load(Ordering::Relaxed));
 #[entry]
 fn main() -> ! {
     // Static, so that the stack holds calls only. The attribute hands these out once, as references.
-    static mut NODE: Option<Node> = None;
+    // Not an `Option`, whose `None` need not be zeros and then takes its size in flash.
+    static mut NODE: MaybeUninit<Node> = MaybeUninit::uninit();
     static mut TO_SEND: ToSend = ToSend::new();
     static mut RECEIVED: Received = Received::new();
 
@@ -51,7 +54,7 @@ fn main() -> ! {
         estop: Input::new(board.PC4, Pull::Down),
     };
     let can = Can::start(board.FDCAN1, board.PA11, board.PA12, TO_SEND, RECEIVED);
-    let node = NODE.insert(Node::new(Config::new(IRB_930, TICK), last.reason));
+    let node = NODE.write(Node::new(Config::new(IRB_930, TICK), last.reason));
     let mut clock = Clock::start();
     let mut port = Port::new(can);
     let mut worst = 0;
@@ -82,7 +85,7 @@ fn main() -> ! {
                 .show(controller.mode(), controller.control_word())
                 .is_err()
             {
-                defmt::error!("a pin does not do what it is told");
+                defmt::error!("a pin does not take the level it is set to");
             }
         }
         if ticked {

@@ -49,6 +49,8 @@ impl Rule {
             }
     }
 
+    // Out of line, as are the next two: in line they would be kilobytes, run once.
+    #[inline(never)]
     fn check(self, field: &'static str, axis: Option<Axis>, value: f32) -> Result<(), ModelError> {
         if self.allows(value) {
             Ok(())
@@ -62,12 +64,14 @@ impl Rule {
         }
     }
 
+    #[inline(never)]
     fn check_joint(self, field: &'static str, joint: &Vector4<f32>) -> Result<(), ModelError> {
         Axis::ALL
             .into_iter()
             .try_for_each(|axis| self.check(field, Some(axis), axis.of(joint)))
     }
 
+    #[inline(never)]
     fn check_vector(
         self,
         field: &'static str,

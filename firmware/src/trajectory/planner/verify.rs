@@ -79,7 +79,7 @@ impl Planner {
             Path::Line { .. } => LINE_STEPS,
         };
         let step = span / f32::from(steps);
-        // A border next to the last sample is no news, and rounding must not keep the walk from going on.
+        // A border next to the last sample adds nothing, and rounding must not keep the walk from going on.
         let soon = t + 0.05 * step;
         let mut next = (t + step).min(*span);
         next = next.min(start + profile.border_after(soon - start));

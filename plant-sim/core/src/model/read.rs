@@ -282,7 +282,7 @@ fn inertia(node: &Node<'_>, allowed: Allowed) -> Result<[f64; 3], ModelError> {
     Ok(moments)
 }
 
-/// The centre of mass of link `index` in the standard DH frame, which stands at the far end of the link.
+/// The centre of mass of link `index` in the standard DH frame, which is at the far end of the link.
 fn com_in_dh_frame(geometry: &Geometry, index: usize, [x, y, z]: [f64; 3]) -> [f64; 3] {
     match index {
         0 => [x - geometry.a1, y, z - geometry.d1],

@@ -7,7 +7,7 @@
 //!
 //! * Only the joint damping D enters the Jacobian: `-M^-1 D` in the velocity block, zero elsewhere.
 //! * D is the secant of the friction law, friction / speed, not its tangent. The tangent vanishes at speed; a step
-//!   that crosses zero would then overshoot, turn, and chatter for ever. The secant of a saturating law is never below
+//!   that crosses zero would then overshoot, turn, and chatter without end. The secant of a saturating law is never below
 //!   its tangent, and for a Jacobian of 0.8 times the true one and upwards the method damps at any step size.
 //!
 //! With D = 0 this is an explicit Runge-Kutta method of order 3.

@@ -20,7 +20,7 @@ const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
 const FACTOR: Allowed = Allowed::within(0.0, 10.0, "");
 
 impl Scenario {
-    /// Everything that can be told without a robot.
+    /// Everything that can be judged without a robot.
     pub(super) fn check(&self) -> Result<(), ScenarioError> {
         if !(1..=MAX_CYCLES).contains(&self.cycles) {
             return Err(self.wrong("cycles", self.cycles, format!("1 to {MAX_CYCLES}")));
@@ -185,8 +185,8 @@ impl Scenario {
     }
 }
 
-/// Line and column of the value under a key such as `cycle[2].jump.to[0]`, if it stands in the text: a default does not,
-/// nor does what the command line says.
+/// Line and column of the value under a key such as `cycle[2].jump.to[0]`, if it is in the text: a default is not,
+/// nor is what the command line says.
 fn place(toml: &str, key: &str) -> Option<(usize, usize)> {
     let document = DeTable::parse(toml).ok()?;
     let mut at = document.span();

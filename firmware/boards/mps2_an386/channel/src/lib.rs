@@ -4,7 +4,7 @@
 //! board says how it ended before ([`greeting`]), the host what the controller is to know and how frames travel
 //! ([`Setup`]), and the board answers once it is ready ([`Reply`]). Then
 //!
-//! - [`Channel::Fifo`]: the host asks ([`Request`]) and waits for the answer ([`Reply`]) for ever after, and ends the
+//! - [`Channel::Fifo`]: the host asks ([`Request`]) and waits for the answer ([`Reply`]) from then on, and ends the
 //!   conversation by closing its end. This is the path for long comparisons: a round trip takes microseconds.
 //! - [`Channel::Uart`]: frames travel as slcan lines over UART 0, as they would on silicon. An empty line acknowledges a
 //!   frame, after the frames that answer it. `O` opens the bus; `C` closes it, and the board's last [`Reply`] says how

@@ -31,7 +31,7 @@ pub enum Request {
 pub enum Fault {
     /// An instruction that does not exist.
     HardFault,
-    /// A function that calls itself for ever.
+    /// A function that calls itself without end.
     StackOverflow,
     /// The same in an interrupt.
     OverflowInInterrupt,

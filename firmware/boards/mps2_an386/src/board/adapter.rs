@@ -55,7 +55,7 @@ pub(crate) fn serve(node: &mut Node, pins: &mut Pins, journal: &mut Journal, per
                 Line::Empty
             }
             Some(Ok(Line::Close)) if open => return,
-            // The bit rates are those of a bus that is not there.
+            // The bit rates are those of an emulated bus.
             Some(Ok(Line::Empty | Line::Close | Line::Bitrate(_) | Line::DataBitrate(_))) => {
                 Line::Empty
             }

@@ -33,7 +33,7 @@ unsafe fn encode(what: impl FnOnce(&mut Encoder)) {
     what(unsafe { &mut *ENCODER.0.get() });
 }
 
-// SAFETY: `acquire` leaves nobody who could write another message until `release`.
+// SAFETY: `acquire` excludes every other writer of a message until `release`.
 unsafe impl Logger for Log {
     fn acquire() {
         let resume = primask::read().is_active();

@@ -130,7 +130,7 @@ pub(crate) struct Port {
     /// A frame taken from the queue to see whether there is one.
     next: Option<CanFrame>,
     estop: bool,
-    /// The emergency-stop chain has opened, and the node has not been told.
+    /// The emergency-stop chain has opened, and the node does not know yet.
     estop_due: bool,
     offline: bool,
 }
