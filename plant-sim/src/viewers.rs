@@ -49,7 +49,10 @@ impl Viewers {
 impl Observer for Viewers {
     fn frame(&mut self, _: Instant, frame: &CanFrame) -> io::Result<()> {
         // A hub takes every frame; clients that do not read lose it, and the run does not wait for them.
-        let _ = self.hub.borrow_mut().transmit(frame);
+        let mut hub = self.hub.borrow_mut();
+        let _ = hub.transmit(frame);
+        // Clients that come later are let in, and frames of any are refused: there is nothing to take.
+        hub.wait(Duration::ZERO).map_err(io::Error::other)?;
         Ok(())
     }
 }
