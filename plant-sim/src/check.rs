@@ -12,7 +12,6 @@
 //! Foreign identifiers and error frames are counted, not judged.
 
 use firmware::mechanics::arm::ArmModel;
-use firmware::node::PEER_TIMEOUT;
 use protocol::codec::{self, DecodeError};
 use protocol::e2e::{Receiver, Verdict};
 use protocol::frame::CanFrame;
@@ -21,6 +20,10 @@ use protocol::schema::{MessageInfo, Rate};
 use protocol::table::{self, TABLE};
 
 use trace::{Entry, Record};
+
+/// Age at which the frames of every sample count as silent, us: what docs/safety.md promises, written again, so that the
+/// judge does not ask the accused.
+const SILENCE_US: u64 = 100_000;
 
 /// The first rule that a trace breaks.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -186,7 +189,7 @@ impl Checker {
                 receiver: info.protection.map(Receiver::new),
                 seen_us: None,
                 limit_us: match info.rate {
-                    Rate::EverySample => Some(PEER_TIMEOUT.micros()),
+                    Rate::EverySample => Some(SILENCE_US),
                     Rate::Hertz(hertz) => Some(2_500_000 / u64::from(hertz)),
                     Rate::Event => None,
                 },

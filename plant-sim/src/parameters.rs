@@ -368,7 +368,7 @@ impl std::str::FromStr for Assignment {
                 .filter(|parameter| parameter.rule.settable != Settable::Never)
                 .map(|parameter| parameter.name)
                 .collect();
-            format!("{name:?} is no parameter; allowed: {}", names.join(", "))
+            format!("{name:?} is not a parameter; allowed: {}", names.join(", "))
         })?;
         let value = value
             .parse()

@@ -76,7 +76,7 @@ fn numbers_print_in_the_precision_of_the_side_that_computed_them() {
 fn a_bad_header_is_told_with_what_is_allowed() {
     assert_eq!(
         refusal("x,y,z,yaw,w\n"),
-        "line 1: unknown column \"w\"; allowed are id, kind, x, y, z, yaw, reason, a_q1, a_q2, a_q3, a_q4, a_in_limits, \
+        "line 1: unknown column \"w\"; allowed: id, kind, x, y, z, yaw, reason, a_q1, a_q2, a_q3, a_q4, a_in_limits, \
          b_q1, b_q2, b_q3, b_q4, b_in_limits, detJ_a, tol_theta2"
     );
     assert_eq!(
@@ -109,7 +109,7 @@ fn a_bad_cell_is_told_with_its_line_and_column() {
                 message,
                 format!("line 4, column y: found {found:?}; {allowed}")
             ),
-            None => assert_eq!(message, "line 4: 5 values; allowed are the header's 4"),
+            None => assert_eq!(message, "line 4: 5 values; allowed: the header's 4"),
         }
     }
     assert_eq!(

@@ -22,7 +22,7 @@ fn an_assignment_says_what_is_allowed() {
         "allowed: NAME=VALUE, such as bandwidth=120"
     );
     let names = refusal("bandwith=1");
-    assert!(names.starts_with("\"bandwith\" is no parameter; allowed: bandwidth, damping, "));
+    assert!(names.starts_with("\"bandwith\" is not a parameter; allowed: bandwidth, damping, "));
     assert!(!names.contains("sampling-period"), "a reading: {names}");
     assert_eq!(
         refusal("brake-delay=60ms"),

@@ -61,7 +61,7 @@ fn of_file(path: &Path, arguments: &[&str]) -> (i32, String, String) {
 fn a_log_without_anything_to_judge_has_an_exit_code_of_its_own() {
     for (subcommand, text, why) in [
         ("check", "", "the log is empty"),
-        ("check", FOREIGN, "no frame of ours"),
+        ("check", FOREIGN, "no frame of this protocol"),
         ("replay", "", "the log is empty"),
         ("replay", FOREIGN, "no command"),
         ("plot", "", "can be drawn"),

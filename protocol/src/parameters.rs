@@ -2,7 +2,7 @@
 //!
 //! Numbers, names, units, ranges and defaults are here and nowhere else: both servers answer from it ([`serve`]),
 //! and the listing for people, `docs/parameters.md` and the comments of the DBC are made of it. A number keeps its
-//! meaning for ever; new parameters get new numbers.
+//! meaning for good; new parameters get new numbers.
 //!
 //! The controller answers the operator. Numbers from [`DRIVES`] on belong to the drives: the controller passes requests
 //! for them on, and their answers back, so that each identifier keeps its one sender.

@@ -22,7 +22,7 @@ holds bandwidth 120.0 || fail "a value that was set is not kept"
 set_one() { timeout 30 "$plant_sim" parameters --bus "slcan:tcp:127.0.0.1:$port" --set "$1"; }
 refused "bandwidth is to be 300; allowed: 1 to 250 rad/s" set_one bandwidth=300
 refused "sampling-period cannot be set" set_one sampling-period=0.001
-refused "is no parameter; allowed: bandwidth, " set_one bandwith=100
+refused "is not a parameter; allowed: bandwidth, " set_one bandwith=100
 refused "the drives on .* do not answer" set_one hold-samples=7
 echo "ok: a controller alone lists and sets its own, and says what is allowed"
 

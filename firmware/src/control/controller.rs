@@ -290,8 +290,8 @@ impl Controller {
             torque: measured_torque,
             reference,
             mean_qd: mean_velocity(reference, period),
-            ahead_qd: reference.qd + reference.qdd * lead + reference.qddd * (0.5 * lead * lead),
-            ahead_qdd: reference.qdd + reference.qddd * lead,
+            qd_ahead: reference.qd + reference.qdd * lead + reference.qddd * (0.5 * lead * lead),
+            qd_aheadd: reference.qdd + reference.qddd * lead,
             period,
             excess: self.excess,
         };

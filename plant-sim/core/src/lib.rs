@@ -27,7 +27,7 @@
 //! up to that instant with the old torques and from there with the new ones. [`metrics`] judges the sample by the truth.
 
 #![forbid(unsafe_code)]
-#![deny(clippy::disallowed_methods)]
+#![deny(clippy::disallowed_methods, clippy::print_stdout, clippy::print_stderr)]
 
 mod allowed;
 pub mod bus;

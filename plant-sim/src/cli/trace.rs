@@ -145,7 +145,7 @@ fn plot(args: &PlotArgs) -> Result<ExitCode, String> {
     plots.retain(|(_, plot)| !plot.is_empty());
     if plots.is_empty() {
         source.verdict()?;
-        return Ok(source.nothing("the log has no frame of ours that can be drawn"));
+        return Ok(source.nothing("the log has no frame of this protocol that can be drawn"));
     }
     let plots: Vec<Plot> = plots.into_iter().map(|(_, plot)| plot).collect();
     written(args.out.as_deref(), |sink| {

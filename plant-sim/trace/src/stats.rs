@@ -169,7 +169,7 @@ impl Bus {
         if let Some(Message::Nmt(nmt)) = tally.frame(record.time_us, frame, busy)
             && nmt.command == NmtCommand::ResetNode
         {
-            // Whoever starts again counts from the start.
+            // A node that starts again counts from the start.
             for tally in self.ids.values_mut() {
                 tally.reset(nmt.node);
             }

@@ -121,7 +121,7 @@ fn every_field_is_there() {
     }
 }
 
-/// Whoever reads a number on the bus finds its name, unit and range in the file.
+/// A number seen on the bus leads to its name, unit and range in the file.
 #[test]
 fn parameters_are_named_where_their_numbers_are() {
     let text = dbc::generate();

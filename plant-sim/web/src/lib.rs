@@ -165,7 +165,7 @@ mod tests {
             (refused("{\"scenario\": \"\"}"), "missing field `name`"),
             (
                 with("law", "magic".into()),
-                "no control law 'magic'; there are kinematic-joint",
+                "no control law 'magic'; allowed: kinematic-joint",
             ),
             (
                 with("rate_hz", 1.into()),

@@ -25,7 +25,7 @@ const QUEUE: usize = 4096 * MAX_LINE;
 const RECEIVED: usize = 4096;
 /// Hardware and software version reported to clients.
 const VERSION: Line = Line::VersionIs([0x10, 0x10]);
-/// Serial number that clients are told.
+/// Serial number reported to clients.
 const SERIAL_NUMBER: Line = Line::SerialNumberIs(*b"0001");
 /// Milliseconds after which timestamps begin again (CAN232).
 const MINUTE: u128 = 60_000;

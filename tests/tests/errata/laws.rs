@@ -66,8 +66,8 @@ impl Controller {
             torque: Vector4::zeros(),
             reference: &reference,
             mean_qd: reference.qd,
-            ahead_qd: reference.qd,
-            ahead_qdd: reference.qdd,
+            qd_ahead: reference.qd,
+            qd_aheadd: reference.qdd,
             period: 1e-3,
             excess: Vector4::zeros(),
         };

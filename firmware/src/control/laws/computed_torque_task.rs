@@ -23,8 +23,8 @@ pub fn torque(
         pull += memory.integrate(&task.position, motion) * gains.integral();
     }
     let desired =
-        task.desired.task_velocity(&motion.ahead_qdd) + task.desired.bias(&motion.ahead_qd);
-    let carried = task.actual.bias(&motion.velocity_ahead());
+        task.desired.task_velocity(&motion.qd_aheadd) + task.desired.bias(&motion.qd_ahead);
+    let carried = task.actual.bias(&motion.measured_qd_ahead());
     let acceleration = task.actual.joint_speed_damped(&(desired - carried + pull));
     computed_torque::realise(situation, &acceleration, gains, compensation, memory)
 }

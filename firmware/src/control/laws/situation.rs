@@ -40,9 +40,9 @@ pub struct Motion<'a> {
     /// Reference velocity through the same filter as `qd`: compared with it without a delay.
     pub mean_qd: Vector4<f32>,
     /// Reference velocity at the middle of the time in which the command will act.
-    pub ahead_qd: Vector4<f32>,
+    pub qd_ahead: Vector4<f32>,
     /// Reference acceleration then.
-    pub ahead_qdd: Vector4<f32>,
+    pub qd_aheadd: Vector4<f32>,
     /// Sampling period, s.
     pub period: f32,
     /// What the limits cut off the efforts of the last sample; 0 where nothing was cut.
@@ -56,8 +56,8 @@ impl Motion<'_> {
     }
 
     /// Measured velocity, brought forward by what the reference gains in the meantime.
-    pub fn velocity_ahead(&self) -> Vector4<f32> {
-        self.qd + (self.ahead_qd - self.mean_qd)
+    pub fn measured_qd_ahead(&self) -> Vector4<f32> {
+        self.qd + (self.qd_ahead - self.mean_qd)
     }
 
     /// Velocity error over the last sample.
@@ -121,9 +121,9 @@ impl Model {
     pub fn new(body: &Body, trig: &Trig, motion: &Motion<'_>) -> Self {
         Self {
             mass: body.mass_matrix(trig),
-            bias: body.lagrange.bias(trig, &motion.velocity_ahead()),
+            bias: body.lagrange.bias(trig, &motion.measured_qd_ahead()),
             gravity: body.lagrange.gravity(),
-            friction: body.drive.friction(&motion.ahead_qd),
+            friction: body.drive.friction(&motion.qd_ahead),
             kinetic_gradient: body.lagrange.kinetic_gradient(trig, &motion.qd),
         }
     }

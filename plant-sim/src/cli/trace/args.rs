@@ -1,4 +1,4 @@
-//! What the subcommands of `trace` are told.
+//! Arguments of the subcommands of `trace`.
 
 use std::path::PathBuf;
 use std::time::Duration;

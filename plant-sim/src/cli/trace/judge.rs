@@ -58,7 +58,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, String> {
     }
     let verdict = source.verdict()?;
     if counts.judged == 0 {
-        return Ok(source.nothing("the log has no frame of ours"));
+        return Ok(source.nothing("the log has no frame of this protocol"));
     }
     show(&format!(
         "{} frames keep every rule; {} foreign frames and {} error frames are not judged\n",
