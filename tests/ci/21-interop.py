@@ -97,11 +97,13 @@ def python_can_log(convert, name, log, frames):
 
 def python_can_asc(convert, name, log, frames):
     channels = channels_of(frames)
+    # The date in the header has milliseconds; what the first frame is later than that is its offset.
+    start = frames[0][0] // 1000 * 1000
     messages = can.ASCReader(convert(log, "asc", f"{name}.asc"), relative_timestamp=True)
     compare(
         f"{name}: python-can reads our ASC",
         [of_message(message, channels) for message in messages],
-        [(frame[0] - frames[0][0], *frame[1:]) for frame in frames],
+        [(frame[0] - start, *frame[1:]) for frame in frames],
     )
 
 
