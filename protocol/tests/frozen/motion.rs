@@ -1,0 +1,155 @@
+//! One frame for every request of an operator.
+
+use super::*;
+
+#[test]
+fn enable() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::Enable,
+        }),
+        5,
+        "2C0##10900000000000000000000000000000000000000000000000000000000000000000000000000000000\
+        0000000005769F",
+    );
+}
+
+#[test]
+fn disable() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::Disable,
+        }),
+        5,
+        "2C0##10901000000000000000000000000000000000000000000000000000000000000000000000000000000\
+        0000000005A2BC",
+    );
+}
+
+#[test]
+fn fault_reset() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::FaultReset,
+        }),
+        5,
+        "2C0##10902000000000000000000000000000000000000000000000000000000000000000000000000000000\
+        0000000005CEF8",
+    );
+}
+
+#[test]
+fn stop() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::Stop,
+        }),
+        5,
+        "2C0##10903000000000000000000000000000000000000000000000000000000000000000000000000000000\
+        00000000051ADB",
+    );
+}
+
+#[test]
+fn move_joint() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::MoveJoint {
+                target: [0.5, -1.0, 0.25, 2.0],
+                speed: 1.0,
+            },
+        }),
+        5,
+        "2C0##109040000003F000080BF0000803E000000400000803F00000000000000000000000000000000000000\
+        0000000005821D",
+    );
+}
+
+#[test]
+fn move_line() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::MoveLine {
+                target: [0.5, -0.25, 0.125, 3.0],
+                speed: 0.5,
+            },
+        }),
+        5,
+        "2C0##109050000003F000080BE0000003E000040400000003F00000000000000000000000000000000000000\
+        000000000574CE",
+    );
+}
+
+#[test]
+fn jump() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::Jump {
+                target: [0.75, 0.25, -0.25, -1.5],
+                top: -0.125,
+                clearance: 0.0625,
+                speed: 1.0,
+            },
+        }),
+        5,
+        "2C0##109060000403F0000803E000080BE0000C0BF000000BE0000803D0000803F0000000000000000000000\
+        00000000057A50",
+    );
+}
+
+#[test]
+fn payload() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::SetPayload {
+                mass: 2.0,
+                com: [0.0, 0.03125, -0.0625],
+                inertia: [0.25, 0.5, 0.75],
+            },
+        }),
+        5,
+        "2C0##1090700000040000000000000003D000080BD0000803E0000003F0000403F0000000000000000000000\
+        0000000005BE8D",
+    );
+}
+
+#[test]
+fn law() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::SelectLaw {
+                law: Law::ComputedTorqueTask,
+                compensation: Compensation::Observer,
+            },
+        }),
+        5,
+        "2C0##10908050200000000000000000000000000000000000000000000000000000000000000000000000000\
+        00000000052A28",
+    );
+}
+
+#[test]
+fn gains() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::SetGains {
+                bandwidth: 60.0,
+                damping: 1.0,
+                observer: 200.0,
+            },
+        }),
+        5,
+        "2C0##10909000070420000803F00004843000000000000000000000000000000000000000000000000000000\
+        000000000572CC",
+    );
+}
