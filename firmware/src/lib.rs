@@ -25,7 +25,7 @@
 //! counts -> joints      mechanics::dynamics::drive
 //! monitor, state        control::monitor, control::states: may it move, must it stop
 //! reference             trajectory::queue: where the arm should be now, and when the command will act
-//! situation             control::laws::situation: kinematics and dynamics at the measured position
+//! control input         control::laws::control_input: kinematics and dynamics at the measured position
 //! law                   control::laws: joint efforts
 //! limits                control::limits: cut to what the motors can give
 //! ```

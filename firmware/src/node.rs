@@ -184,30 +184,30 @@ impl Node {
         let counter = counter.unwrap_or(0);
         match message {
             Message::Feedback(feedback) => {
-                let verdict = self.feedback.judge(counter);
-                if self.admit(verdict) {
+                let verdict = self.feedback.check(counter);
+                if self.accept(verdict) {
                     self.bad_feedback = 0;
                     return self.sample(feedback, now, bus, probe);
                 }
                 self.suspect(Cause::Reordered);
             }
             Message::Motion(motion) => {
-                let verdict = self.motion.judge(counter);
-                if self.admit(verdict) {
+                let verdict = self.motion.check(counter);
+                if self.accept(verdict) {
                     self.motion(motion, verdict);
                 }
             }
             Message::EStop(_) => self.controller.fail(Fault::because(Cause::EStop)),
             Message::ParameterRequest(Server::Controller, request) => {
-                let verdict = self.parameter.judge(counter);
-                if self.admit(verdict) {
+                let verdict = self.parameter.check(counter);
+                if self.accept(verdict) {
                     self.parameter(request, verdict, bus);
                 }
             }
             Message::ParameterReply(Server::Drives, reply) => {
-                let verdict = self.drives_parameter.judge(counter);
+                let verdict = self.drives_parameter.check(counter);
                 // Introductions concern neighbours only.
-                if self.admit(verdict) && !matches!(reply, ParameterReply::Hello(_)) {
+                if self.accept(verdict) && !matches!(reply, ParameterReply::Hello(_)) {
                     self.reply_parameter(*reply, bus);
                 }
             }
@@ -248,7 +248,7 @@ impl Node {
             steps,
             status: feedback.status,
             counts: feedback.position,
-            speed: Vector4::from(feedback.velocity),
+            velocity: Vector4::from(feedback.velocity),
             torque: Vector4::new(t1, t2, t3, t4).component_mul(&rated),
         };
         let actions = self.controller.step(&readings, probe);
@@ -287,8 +287,8 @@ impl Node {
     }
 
     /// Counts what the counter says was lost, repeated or late; `true` for a frame to act on.
-    fn admit(&mut self, verdict: Verdict) -> bool {
-        self.received.judge(verdict);
+    fn accept(&mut self, verdict: Verdict) -> bool {
+        self.received.count(verdict);
         !matches!(verdict, Verdict::Duplicate | Verdict::Stale(_))
     }
 

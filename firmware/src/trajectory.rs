@@ -5,16 +5,16 @@
 //! ```
 //!
 //! A [`Trajectory`] is a closed form: a path, a jerk-limited time law along it, for a jump a lift
-//! profile laid over it, and one rate that scales all of it in time. Nothing is tabulated, so it
+//! profile laid over it, and one time scale that scales all of it in time. Nothing is tabulated, so it
 //! costs a few hundred bytes and can be evaluated at any instant and any control rate.
 
-pub mod capacity;
 pub mod clock;
 pub mod path;
 pub mod planner;
 pub mod profile;
 pub mod queue;
 pub mod request;
+pub mod torque_budget;
 
 use nalgebra::Vector4;
 
@@ -73,8 +73,8 @@ pub struct Trajectory {
     pub lift: Option<Lift>,
     /// Length before scaling, s.
     pub span: f32,
-    /// Time scale, 0 < rate <= 1: the move lasts `span / rate`.
-    pub rate: f32,
+    /// Time scale, 0 < scale <= 1: the move lasts `span / time_scale`.
+    pub time_scale: f32,
     /// Largest joint accelerations of the move at full speed: what a stop may brake with.
     pub braking: Vector4<f32>,
     /// Joint positions at the end.
@@ -86,7 +86,7 @@ pub struct Trajectory {
 impl Trajectory {
     /// Time from rest to rest, s.
     pub fn duration(&self) -> f32 {
-        self.span / self.rate
+        self.span / self.time_scale
     }
 
     /// Reference at `t` seconds after the start, held at both ends.
@@ -94,7 +94,7 @@ impl Trajectory {
     /// # Errors
     /// A line that the planner has not surveyed may leave the reach; a planned one cannot.
     pub fn at(&self, arm: &ArmModel, t: f32) -> Result<Reference, PathError> {
-        let t = t * self.rate;
+        let t = t * self.time_scale;
         let Sample { s, v, a, j } = self.profile.at(t - self.start);
         let mut reference = match &self.path {
             // As below, without what is zero: nearly every move is one of these.
@@ -123,10 +123,10 @@ impl Trajectory {
             reference.qdd.z = down.a - up.a;
             reference.qddd.z = down.j - up.j;
         }
-        let rate = self.rate;
-        reference.qd *= rate;
-        reference.qdd *= rate * rate;
-        reference.qddd *= rate * rate * rate;
+        let scale = self.time_scale;
+        reference.qd *= scale;
+        reference.qdd *= scale * scale;
+        reference.qddd *= scale * scale * scale;
         Ok(reference)
     }
 }

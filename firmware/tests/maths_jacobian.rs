@@ -95,7 +95,7 @@ proptest! {
             + (2.0 * element_error(&arm) + 8.0 * U * reach(&arm)) * 2.0 * fast * fast;
         let bound = Vector4::new(planar, planar, 0.0, 0.0);
         assert_close("bias", &jacobian.bias(&qd), &difference, &bound);
-        assert_close("rate times qd", &(jacobian.rate(&qd) * qd), &difference, &bound);
+        assert_close("rate times qd", &(jacobian.time_derivative(&qd) * qd), &difference, &bound);
     }
 
     /// Product and sum of squares, which between them leave no other pair; and what they mean.

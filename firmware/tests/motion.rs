@@ -6,9 +6,9 @@ use firmware::mechanics::body::Body;
 use firmware::mechanics::dynamics::newton_euler;
 use firmware::mechanics::kinematics::{self, Pose};
 use firmware::trajectory::Trajectory;
-use firmware::trajectory::capacity::Capacity;
 use firmware::trajectory::planner::Planner;
 use firmware::trajectory::request::{Request, Target};
+use firmware::trajectory::torque_budget::TorqueBudget;
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 use protocol::messages::{Refusal, RefusalReason};
@@ -43,7 +43,7 @@ fn plan(
     speed: f32,
 ) -> Result<Trajectory, Refusal> {
     let body = Body::new(arm, payload);
-    let capacity = Capacity { arm, body: &body };
+    let budget = TorqueBudget { arm, body: &body };
     let mut planner = Planner::new();
     planner.begin(
         &Request {
@@ -54,7 +54,7 @@ fn plan(
         from,
     );
     for _ in 0..Planner::MAX_STEPS {
-        if let Some(result) = planner.work(&capacity) {
+        if let Some(result) = planner.work(&budget) {
             return result.map(|()| *planner.trajectory());
         }
     }

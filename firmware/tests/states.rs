@@ -190,7 +190,7 @@ fn at_rest() -> Readings {
         steps: 1,
         status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
         counts: drive.counts_of_motor_angle(&drive.motor_angle(&q)),
-        speed: Vector4::zeros(),
+        velocity: Vector4::zeros(),
         torque: Vector4::zeros(),
     }
 }

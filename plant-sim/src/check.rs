@@ -266,7 +266,7 @@ impl Checker {
         if let Some(watch) = self.messages.iter_mut().find(|watch| watch.info == info) {
             watch.seen_us = Some(time_us);
             if let (Some(counter), Some(receiver)) = (received.counter, &mut watch.receiver) {
-                let verdict = receiver.judge(counter);
+                let verdict = receiver.check(counter);
                 if !matches!(verdict, Verdict::Initial | Verdict::Fresh) {
                     return Err(Offence::Counter {
                         message: info.name,

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use sim::observer::Observer;
-use sim::world::Hand;
+use sim::world::CellEvent;
 
 /// Says on standard error how far a long run is.
 pub struct Progress {
@@ -24,8 +24,8 @@ impl Progress {
 }
 
 impl Observer for Progress {
-    fn hand(&mut self, hand: &Hand) {
-        if matches!(hand, Hand::EndCycle) {
+    fn cell_event(&mut self, event: &CellEvent) {
+        if matches!(event, CellEvent::EndCycle) {
             self.done += 1;
             if self.shown.elapsed().as_secs() >= 2 {
                 self.shown = Instant::now();

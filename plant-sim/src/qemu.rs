@@ -121,7 +121,7 @@ impl Qemu {
     /// # Errors
     /// The board does not start again.
     pub fn plant(&mut self, fault: Fault) -> Result<(), PeerError> {
-        self.board.tell(&Request::Plant(fault))?;
+        self.board.send_request(&Request::Plant(fault))?;
         let reason = self.follow_restart()?;
         self.twin.restart(reason);
         Ok(())
@@ -173,7 +173,7 @@ impl Qemu {
         self.sent.clear();
         match self.channel {
             Some(Channel::Uart) => self.board.send(&frame)?,
-            _ => self.board.tell(&Request::Poll {
+            _ => self.board.send_request(&Request::Poll {
                 now: self.twin.controller().now(),
                 frame: Some(frame),
             })?,

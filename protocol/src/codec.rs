@@ -29,7 +29,7 @@ pub use encoder::Encoder;
 pub struct Received {
     /// Message.
     pub message: Message,
-    /// Counter for [`Receiver::judge`](crate::e2e::Receiver::judge).
+    /// Counter for [`Receiver::check`](crate::e2e::Receiver::check).
     pub counter: Option<u8>,
 }
 

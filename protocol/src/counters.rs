@@ -50,7 +50,7 @@ impl Counters {
     }
 
     /// Counts one verdict.
-    pub const fn judge(&mut self, verdict: Verdict) {
+    pub const fn count(&mut self, verdict: Verdict) {
         match verdict {
             Verdict::Initial | Verdict::Fresh => {}
             Verdict::Lost(frames) => self.lost = self.lost.saturating_add(frames as u16),

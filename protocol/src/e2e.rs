@@ -189,9 +189,9 @@ impl Receiver {
         self.newest = None;
     }
 
-    /// Judges the counter of a frame whose CRC is right. Only a new frame moves the sequence on.
+    /// Checks the counter of a frame whose CRC is right. Only a new frame moves the sequence on.
     #[must_use]
-    pub fn judge(&mut self, counter: u8) -> Verdict {
+    pub fn check(&mut self, counter: u8) -> Verdict {
         let max = self.profile.counter_max();
         let verdict = match self.newest {
             None => Verdict::Initial,

@@ -112,7 +112,7 @@ impl Rule {
     ///
     /// # Errors
     /// The reason, with the bound violated where it is [`ParameterError::OutOfRange`], otherwise 0.
-    pub const fn admit(
+    pub const fn check_change(
         &self,
         value: f32,
         period: f32,

@@ -163,11 +163,11 @@ fn every_cause_is_counted_once() {
     for error in &errors {
         counters.refuse(error);
     }
-    counters.judge(Verdict::Duplicate);
-    counters.judge(Verdict::Stale(3));
-    counters.judge(Verdict::Lost(5));
-    counters.judge(Verdict::Fresh);
-    counters.judge(Verdict::Initial);
+    counters.count(Verdict::Duplicate);
+    counters.count(Verdict::Stale(3));
+    counters.count(Verdict::Lost(5));
+    counters.count(Verdict::Fresh);
+    counters.count(Verdict::Initial);
     let one_each = Counters {
         unknown_id: 1,
         wrong_kind: 1,

@@ -143,7 +143,7 @@ proptest! {
         let (profile, half) = if classical { (Profile::Classical, 8) } else { (Profile::Fd, 128) };
         let mut receiver = Receiver::new(profile);
         let wire = |count: i64| count.rem_euclid(2 * half) as u8;
-        prop_assert_eq!(receiver.judge(wire(start)), Verdict::Initial);
+        prop_assert_eq!(receiver.check(wire(start)), Verdict::Initial);
         let mut newest = start;
         for step in steps {
             // From half the range behind to one less than half ahead.
@@ -154,20 +154,20 @@ proptest! {
                 2.. => Verdict::Lost((step - 1) as u8),
                 _ => Verdict::Stale(-step as u8),
             };
-            prop_assert_eq!(receiver.judge(wire(newest + step)), expected);
+            prop_assert_eq!(receiver.check(wire(newest + step)), expected);
             newest = newest.max(newest + step);
         }
         receiver.reset();
-        prop_assert_eq!(receiver.judge(wire(newest)), Verdict::Initial);
+        prop_assert_eq!(receiver.check(wire(newest)), Verdict::Initial);
     }
 }
 
 #[test]
 fn a_stuck_counter_never_becomes_new() {
     let mut receiver = Receiver::new(Profile::Fd);
-    assert!(receiver.judge(9).is_new());
-    assert!((0..1000).all(|_| receiver.judge(9) == Verdict::Duplicate));
-    assert_eq!(receiver.judge(10), Verdict::Fresh);
+    assert!(receiver.check(9).is_new());
+    assert!((0..1000).all(|_| receiver.check(9) == Verdict::Duplicate));
+    assert_eq!(receiver.check(10), Verdict::Fresh);
 }
 
 /// A count that stays at its greatest value says that there may have been more.
@@ -175,11 +175,11 @@ fn a_stuck_counter_never_becomes_new() {
 fn a_count_that_ran_out_is_no_exact_one() {
     let mut counters = Counters::default();
     for _ in 0..u16::MAX - 1 {
-        counters.judge(Verdict::Duplicate);
+        counters.count(Verdict::Duplicate);
     }
     assert_eq!(counters.to_string(), "65534 duplicate");
     for _ in 0..2 {
-        counters.judge(Verdict::Duplicate);
+        counters.count(Verdict::Duplicate);
     }
     assert_eq!(counters.to_string(), ">= 65535 duplicate");
 }

@@ -21,7 +21,7 @@ use protocol::messages::{
 use protocol::time::Period;
 use serde::{Deserialize, Serialize};
 
-use crate::control::laws::{Memory, Model, Motion, Selection, Situation, Task};
+use crate::control::laws::{ControlInput, Memory, Model, Motion, Selection, Task};
 use crate::control::limits;
 use crate::control::monitor::Monitor;
 use crate::control::phase::{Phase, Probe};
@@ -78,8 +78,8 @@ pub struct Readings {
     pub status: DriveStatus,
     /// Motor encoder counts.
     pub counts: [i32; 4],
-    /// Motor speeds, rad/s, means over the last sample.
-    pub speed: Vector4<f32>,
+    /// Motor velocities, rad/s, means over the last sample.
+    pub velocity: Vector4<f32>,
     /// Motor torques, N m, means over the last sample.
     pub torque: Vector4<f32>,
 }
@@ -250,7 +250,7 @@ impl Controller {
     /// Takes an operator's request. Answers follow by [`Controller::take_reply`]: at once, or for
     /// a move when it has been planned.
     pub fn request(&mut self, sequence: u8, request: &MotionRequest) {
-        match self.judge(sequence, request) {
+        match self.accept(sequence, request) {
             Ok(Answer::Now) => self.reply(sequence, Outcome::Accepted),
             Ok(Answer::WhenPlanned) => {}
             Err(refusal) => self.reply(sequence, Outcome::Refused(refusal)),
@@ -262,7 +262,7 @@ impl Controller {
     pub fn step<P: Probe>(&mut self, readings: &Readings, probe: &mut P) -> Actions {
         let drive = &self.body.drive;
         let q = drive.joint_angle(&drive.motor_angle_of_counts(&readings.counts));
-        let qd = drive.joint_speed(&readings.speed);
+        let qd = drive.joint_speed(&readings.velocity);
         let measured_torque = drive.joint_torque(&readings.torque);
 
         if readings.steps > 1 {
@@ -301,7 +301,7 @@ impl Controller {
         probe.end(Phase::Kinematics);
         let model = Model::new(&self.body, &trig, &motion);
         probe.end(Phase::Dynamics);
-        let situation = Situation {
+        let input = ControlInput {
             motion: &motion,
             task: &task,
             model: &model,
@@ -311,7 +311,7 @@ impl Controller {
             // The brake holds: what it carries must not be taken for a disturbance.
             self.memory = Memory::new();
         }
-        let torque = self.setup.selection.torque(&situation, &mut self.memory);
+        let torque = self.setup.selection.torque(&input, &mut self.memory);
         if !torque.iter().all(|torque| torque.is_finite()) {
             // Nothing finite that comes in leads here; should it happen, the brake is the answer.
             self.memory = Memory::new();

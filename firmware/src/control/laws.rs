@@ -9,17 +9,17 @@
 //! | [`computed_torque`] | dynamic control, joint space, tracking form | M, C, g, friction |
 //! | [`computed_torque_task`] | eq 49 | the same and the Jacobian |
 //!
-//! All are pure functions of a [`Situation`] plus a [`Memory`] (integrals and observer). Outputs
+//! All are pure functions of a [`ControlInput`] plus a [`Memory`] (integrals and observer). Outputs
 //! are joint torques: N m, N m, N, N m.
 
 pub mod computed_torque;
 pub mod computed_torque_task;
+mod control_input;
 pub mod kinematic_joint;
 pub mod kinematic_task;
 pub mod observer;
 pub mod pd_gravity;
 pub mod pid;
-mod situation;
 mod velocity_loop;
 
 use nalgebra::Vector4;
@@ -27,8 +27,8 @@ use protocol::messages::{Compensation, Law, Refusal, RefusalReason};
 use protocol::parameters::ControllerParameter as Parameter;
 use serde::{Deserialize, Serialize};
 
+pub use control_input::{ControlInput, Model, Motion, Task};
 use observer::MomentumObserver;
-pub use situation::{Model, Motion, Situation, Task};
 
 /// Closed-loop gains, the same three numbers for every law and every robot: they are turned into
 /// accelerations, and inertia turns those into torque.
@@ -138,18 +138,18 @@ pub struct Selection {
 
 impl Selection {
     /// Joint torques for one sample.
-    pub fn torque(&self, situation: &Situation<'_>, memory: &mut Memory) -> Vector4<f32> {
+    pub fn torque(&self, input: &ControlInput<'_>, memory: &mut Memory) -> Vector4<f32> {
         let gains = &self.gains;
         match self.law {
-            Law::KinematicJoint => kinematic_joint::torque(situation, gains, memory),
-            Law::KinematicTask => kinematic_task::torque(situation, gains, memory),
-            Law::Pid => pid::torque(situation, gains, memory),
-            Law::PdGravity => pd_gravity::torque(situation, gains),
+            Law::KinematicJoint => kinematic_joint::torque(input, gains, memory),
+            Law::KinematicTask => kinematic_task::torque(input, gains, memory),
+            Law::Pid => pid::torque(input, gains, memory),
+            Law::PdGravity => pd_gravity::torque(input, gains),
             Law::ComputedTorqueJoint => {
-                computed_torque::torque(situation, gains, self.compensation, memory)
+                computed_torque::torque(input, gains, self.compensation, memory)
             }
             Law::ComputedTorqueTask => {
-                computed_torque_task::torque(situation, gains, self.compensation, memory)
+                computed_torque_task::torque(input, gains, self.compensation, memory)
             }
         }
     }

@@ -121,12 +121,12 @@ impl Monitor {
             self.reset();
             return None;
         }
-        self.judge(q, qd, error, [following, speed, range])
+        self.trip(q, qd, error, [following, speed, range])
     }
 
     /// Out of line: rarely reached in a sample.
     #[inline(never)]
-    fn judge(
+    fn trip(
         &mut self,
         q: &Vector4<f32>,
         qd: &Vector4<f32>,

@@ -137,7 +137,7 @@ impl Jacobian {
     ///
     /// Paper function; not on the control path.
     #[must_use]
-    pub fn rate(&self, qd: &Vector4<f32>) -> Matrix4<f32> {
+    pub fn time_derivative(&self, qd: &Vector4<f32>) -> Matrix4<f32> {
         let Self { x1, x2, y1, y2, .. } = *self;
         let (w1, w12) = (qd.x, qd.x + qd.y);
         let (x2_rate, y2_rate) = (-y2 * w12, x2 * w12);

@@ -14,9 +14,9 @@ const STOP_JERK_SHARE: f32 = 0.5;
 pub struct Clock {
     ticks: u32,
     fraction: f32,
-    /// Clock rate: 1 in motion, 0 when stopped.
-    rate: f32,
-    /// Change of the rate, 1/s; never positive.
+    /// Time scale: 1 in motion, 0 when stopped.
+    time_scale: f32,
+    /// Change of the time scale, 1/s; never positive.
     slope: f32,
 }
 
@@ -25,7 +25,7 @@ impl Default for Clock {
         Self {
             ticks: 0,
             fraction: 0.0,
-            rate: 1.0,
+            time_scale: 1.0,
             slope: 0.0,
         }
     }
@@ -39,13 +39,13 @@ impl Clock {
 
     /// Whether a stop has come to rest.
     pub fn is_stopped(&self) -> bool {
-        self.rate <= 0.0
+        self.time_scale <= 0.0
     }
 
     /// One sample on.
     pub fn advance(&mut self, period: f32) {
-        let step = self.rate + 0.5 * self.slope * period;
-        self.rate = (self.rate + self.slope * period).max(0.0);
+        let step = self.time_scale + 0.5 * self.slope * period;
+        self.time_scale = (self.time_scale + self.slope * period).max(0.0);
         self.fraction += step.max(0.0);
         if self.fraction >= 1.0 {
             self.fraction -= 1.0;
@@ -74,25 +74,25 @@ impl Clock {
         {
             let speed = qd.abs();
             if speed * period > f32::EPSILON {
-                let own = self.rate * self.rate * if *qd > 0.0 { *qdd } else { -*qdd };
+                let own = self.time_scale * self.time_scale * if *qd > 0.0 { *qdd } else { -*qdd };
                 steepest = steepest.min((available + own).max(0.0) / speed);
                 bend = bend.min(STOP_JERK_SHARE * jerk / speed);
             }
         }
         if bend == f32::MAX {
             // At rest on the trajectory: nothing to brake.
-            self.rate = 0.0;
+            self.time_scale = 0.0;
             self.slope = 0.0;
             return;
         }
-        let flare = sqrt(2.0 * bend * self.rate);
+        let flare = sqrt(2.0 * bend * self.time_scale);
         let next = (-self.slope + bend * period).min(steepest).min(flare);
         self.slope = -next;
     }
 
     /// The reference as the braked clock runs through it.
     pub fn apply(&self, reference: &Reference) -> Reference {
-        let (r, slope) = (self.rate, self.slope);
+        let (r, slope) = (self.time_scale, self.slope);
         Reference {
             q: reference.q,
             qd: reference.qd * r,

@@ -26,10 +26,10 @@ use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
 use super::Trajectory;
-use super::capacity::Capacity;
 use super::path::{Path, PathPoint};
 use super::profile::{Bounds, SCurve};
 use super::request::{Gate, Request, Target, from_path};
+use super::torque_budget::TorqueBudget;
 use crate::mechanics::arm::ArmModel;
 use verify::LINE_STEPS;
 
@@ -74,13 +74,13 @@ enum Stage {
     Verify {
         /// Time of the sample, s.
         t: f32,
-        rate: f32,
+        time_scale: f32,
         /// Time and acceleration of the sample before.
         before: Option<(f32, Vector4<f32>)>,
     },
     /// All samples are seen.
     Finish {
-        rate: f32,
+        time_scale: f32,
     },
 }
 
@@ -125,7 +125,7 @@ impl Planner {
                 start: 0.0,
                 lift: None,
                 span: 0.0,
-                rate: 1.0,
+                time_scale: 1.0,
                 braking: Vector4::zeros(),
                 end: Vector4::zeros(),
                 sequence: 0,
@@ -171,13 +171,13 @@ impl Planner {
 
     /// One step of planning: one sample of the move, or one profile. When the plan is complete,
     /// `Ok` says that [`Planner::trajectory`] is the one asked for, and `Err` why there is none.
-    pub fn work(&mut self, capacity: &Capacity<'_>) -> Option<Result<(), Refusal>> {
+    pub fn work(&mut self, budget: &TorqueBudget<'_>) -> Option<Result<(), Refusal>> {
         let step = match self.stage {
             Stage::Idle => return None,
-            Stage::Locate => self.locate(capacity.arm),
-            Stage::Survey { point, fastest } => self.survey(capacity, point, fastest),
+            Stage::Locate => self.locate(budget.arm),
+            Stage::Survey { point, fastest } => self.survey(budget, point, fastest),
             Stage::Stroke { down } => {
-                self.stroke(capacity, down);
+                self.stroke(budget, down);
                 Ok(())
             }
             Stage::Clear { down } => {
@@ -188,9 +188,13 @@ impl Planner {
                 self.compose(round);
                 Ok(())
             }
-            Stage::Balance { round, point, gain } => self.balance(capacity, round, point, gain),
-            Stage::Verify { t, rate, before } => self.verify(capacity, t, rate, before),
-            Stage::Finish { rate } => self.finish(capacity, rate),
+            Stage::Balance { round, point, gain } => self.balance(budget, round, point, gain),
+            Stage::Verify {
+                t,
+                time_scale,
+                before,
+            } => self.verify(budget, t, time_scale, before),
+            Stage::Finish { time_scale } => self.finish(budget, time_scale),
         };
         if step.is_err() {
             self.stage = Stage::Idle;
@@ -216,7 +220,7 @@ impl Planner {
         self.draft.path = path;
         self.draft.start = 0.0;
         self.draft.lift = None;
-        self.draft.rate = 1.0;
+        self.draft.time_scale = 1.0;
         self.draft.braking = Vector4::zeros();
         // Stands for a path on which nothing travels.
         self.draft.profile = SCurve::default();
@@ -254,7 +258,7 @@ impl Planner {
         } else {
             Stage::Verify {
                 t: 0.0,
-                rate: 1.0,
+                time_scale: 1.0,
                 before: None,
             }
         };
@@ -267,7 +271,7 @@ impl Default for Planner {
     }
 }
 
-/// The rate along the path at which the first joint reaches its limit, with the joints' travels per unit of path; huge
+/// The speed along the path at which the first joint reaches its limit, with the joints' travels per unit of path; huge
 /// where nothing travels.
 fn fill(limit: &Vector4<f32>, travel: &Vector4<f32>) -> f32 {
     limit

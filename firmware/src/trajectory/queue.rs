@@ -4,10 +4,10 @@ use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
-use super::capacity::Capacity;
 use super::clock::Clock;
 use super::planner::Planner;
 use super::request::Request;
+use super::torque_budget::TorqueBudget;
 use super::{Reference, Trajectory};
 use crate::mechanics::arm::ArmModel;
 
@@ -106,7 +106,7 @@ impl MoveQueue {
     }
 
     /// One step of planning. Returns the number of a request and its answer, when it has one.
-    pub fn plan(&mut self, capacity: &Capacity<'_>) -> Option<(u8, Result<(), Refusal>)> {
+    pub fn plan(&mut self, budget: &TorqueBudget<'_>) -> Option<(u8, Result<(), Refusal>)> {
         if self.planner.is_idle() {
             if self.moves.is_full() {
                 return None;
@@ -115,7 +115,7 @@ impl MoveQueue {
             self.planner.begin(&request, &self.plan_end);
             return None;
         }
-        let planned = self.planner.work(capacity)?;
+        let planned = self.planner.work(budget)?;
         let sequence = self.planner.sequence();
         Some((
             sequence,

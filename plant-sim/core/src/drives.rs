@@ -110,7 +110,7 @@ impl Drives {
     fn receive(&mut self, frame: &CanFrame, plant: &mut Plant) {
         if let Ok(received) = codec::decode(frame)
             && let Message::Command(command) = received.message
-            && self.commands.judge(received.counter.unwrap_or(0)).is_new()
+            && self.commands.check(received.counter.unwrap_or(0)).is_new()
         {
             self.apply(&command, plant);
         }
@@ -123,7 +123,7 @@ impl Drives {
         let Message::ParameterRequest(Server::Drives, request) = received.message else {
             return None;
         };
-        let verdict = self.requests.judge(received.counter.unwrap_or(0));
+        let verdict = self.requests.check(received.counter.unwrap_or(0));
         if !verdict.is_new() {
             return None;
         }

@@ -6,7 +6,7 @@ use protocol::frame::CanFrame;
 use protocol::time::Instant;
 
 use crate::plant::Plant;
-use crate::world::{Hand, Mind};
+use crate::world::{CellEvent, Mind};
 
 /// One sample as it truly was, and what the controller wanted it to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,8 +70,8 @@ pub trait Observer {
     }
 
     /// A cycle begins or ends.
-    fn hand(&mut self, hand: &Hand) {
-        let _ = hand;
+    fn cell_event(&mut self, event: &CellEvent) {
+        let _ = event;
     }
 }
 
@@ -86,8 +86,8 @@ impl<O: Observer> Observer for &mut O {
         (**self).sample(truth)
     }
 
-    fn hand(&mut self, hand: &Hand) {
-        (**self).hand(hand);
+    fn cell_event(&mut self, event: &CellEvent) {
+        (**self).cell_event(event);
     }
 }
 
@@ -102,9 +102,9 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
         self.1.sample(truth)
     }
 
-    fn hand(&mut self, hand: &Hand) {
-        self.0.hand(hand);
-        self.1.hand(hand);
+    fn cell_event(&mut self, event: &CellEvent) {
+        self.0.cell_event(event);
+        self.1.cell_event(event);
     }
 }
 

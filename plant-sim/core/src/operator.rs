@@ -15,7 +15,7 @@ use protocol::time::{Duration, Instant, Period};
 
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::scenario::Scenario;
-use crate::world::{Hand, OperatorError, World};
+use crate::world::{CellEvent, OperatorError, World};
 use program::{Action, program};
 
 /// Longest wait for a reply.
@@ -165,13 +165,13 @@ impl Operator {
             }
             self.progress = Progress::Due;
             self.current = self.actions.next();
-            if let Action::Hand(hand) = action {
-                match hand {
-                    Hand::Attach(payload) => world.plant.attach(payload),
-                    Hand::Release => world.plant.release(),
-                    Hand::BeginCycle | Hand::EndCycle => {}
+            if let Action::Cell(event) = action {
+                match event {
+                    CellEvent::Attach(payload) => world.plant.attach(payload),
+                    CellEvent::Release => world.plant.release(),
+                    CellEvent::BeginCycle | CellEvent::EndCycle => {}
                 }
-                world.hands.push(hand);
+                world.cell_events.push(event);
                 return Ok(false);
             }
         }
@@ -267,7 +267,7 @@ impl Operator {
                 MOVE_LIMIT,
             ),
             Action::Dwell(time) => (waited >= *time, Duration::MAX),
-            Action::Hand(_) => (true, Duration::MAX),
+            Action::Cell(_) => (true, Duration::MAX),
         };
         if !complete && waited > limit {
             return Err(OperatorError::Late {
@@ -287,7 +287,7 @@ impl Operator {
             }
             Action::WaitMode(mode) => format!("state {mode}"),
             Action::WaitArrived => "end of the move".into(),
-            Action::Dwell(_) | Action::Hand(_) => "end of a dwell".into(),
+            Action::Dwell(_) | Action::Cell(_) => "end of a dwell".into(),
         }
     }
 }

@@ -108,7 +108,7 @@ impl<'p> Rig<'p> {
             world: World {
                 plant: Plant::new(&config.actual, config.start),
                 mind: Mind::BLANK,
-                hands: Vec::new(),
+                cell_events: Vec::new(),
                 outcome: None,
             },
             outside: bus.attach(MAILBOXES),
@@ -288,8 +288,8 @@ impl<'p> Rig<'p> {
             let place = self.pending.partition_point(|(other, ..)| *other <= time);
             self.pending.insert(place, (time.max(now), *node, frame));
         }
-        for hand in self.world.hands.drain(..) {
-            observer.hand(&hand);
+        for event in self.world.cell_events.drain(..) {
+            observer.cell_event(&event);
         }
         Ok(())
     }

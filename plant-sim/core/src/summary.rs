@@ -14,7 +14,7 @@ use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
 use crate::observer::{Observer, Truth};
 use crate::rig::{Rig, RunError};
 use crate::setup::RunConfig;
-use crate::world::Hand;
+use crate::world::CellEvent;
 
 /// Summary of a run, as `summary.json` holds it. Times in s, lengths in mm, shares of 1.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -236,11 +236,11 @@ impl Observer for Collector {
         Ok(())
     }
 
-    fn hand(&mut self, hand: &Hand) {
-        match hand {
-            Hand::BeginCycle => self.metrics.begin_cycle(self.target),
-            Hand::EndCycle => self.metrics.end_cycle(),
-            Hand::Attach(_) | Hand::Release => {}
+    fn cell_event(&mut self, event: &CellEvent) {
+        match event {
+            CellEvent::BeginCycle => self.metrics.begin_cycle(self.target),
+            CellEvent::EndCycle => self.metrics.end_cycle(),
+            CellEvent::Attach(_) | CellEvent::Release => {}
         }
     }
 }

@@ -7,14 +7,14 @@ use protocol::time::{Duration, Instant};
 use crate::model::Payload;
 use crate::plant::Plant;
 
-/// What peers share besides the bus: the robot between drives and hands, and what each lets the run know.
+/// What peers share besides the bus: the robot between drives and operator, and what each lets the run know.
 pub struct World {
     /// The robot. It stands still until somebody moves it on to the present.
     pub plant: Plant,
     /// What the controller has in mind.
     pub mind: Mind,
-    /// What was done by hand in this call.
-    pub hands: Vec<Hand>,
+    /// What happened in the cell in this call.
+    pub cell_events: Vec<CellEvent>,
     /// How the operator's work has ended.
     pub outcome: Option<Result<(), OperatorError>>,
 }
@@ -50,9 +50,9 @@ impl Mind {
     }
 }
 
-/// What the operator does by hand, and where a cycle begins and ends.
+/// What happens in the cell beside the bus: the gripper takes or drops a payload, a cycle begins or ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Hand {
+pub enum CellEvent {
     /// Put this into the gripper.
     Attach(Payload),
     /// Open the gripper.

@@ -43,7 +43,7 @@ impl Bench {
             world: World {
                 plant: Plant::new(&model, START),
                 mind: Mind::BLANK,
-                hands: Vec::new(),
+                cell_events: Vec::new(),
                 outcome: None,
             },
             drives: Drives::new(&model, PERIOD),

@@ -215,13 +215,13 @@ fn what_this_robot_cannot_do_is_refused_before_the_run() {
         (
             "dwell = 0.1",
             "pick = { mass = 5, com_flange_frame = [0, 0, 0], inertia_com_diag = [0, 0, 0] }",
-            "cycle[1].pick is a payload of 5 kg; allowed: a hand that is empty; it holds 2 kg",
+            "cycle[1].pick is a payload of 5 kg; allowed: an empty gripper; it holds 2 kg",
         ),
         // The second cycle begins with an empty hand.
         (
             "dwell = 0.1",
             "place = {}",
-            "cycle[1].place is nothing; allowed: a hand that holds something",
+            "cycle[1].place is nothing; allowed: a gripper that holds something",
         ),
     ] {
         let message = refusal(from, to);

@@ -206,12 +206,12 @@ impl Board {
         request: &Request,
         sent: &mut Vec<CanFrame>,
     ) -> Result<Measured, PeerError> {
-        self.tell(request)?;
+        self.send_request(request)?;
         self.answer(sent)
     }
 
     /// Sends a request that has no answer: the board restarts.
-    pub(super) fn tell(&mut self, request: &Request) -> Result<(), PeerError> {
+    pub(super) fn send_request(&mut self, request: &Request) -> Result<(), PeerError> {
         self.say(&request.to_bytes())
     }
 

@@ -240,7 +240,7 @@ impl Client {
                     }
                 }
             }
-            Err(error) => self.judge(&error),
+            Err(error) => self.classify(&error),
         }
     }
 
@@ -294,12 +294,12 @@ impl Client {
             match self.stream.write(front) {
                 Ok(0) => return,
                 Ok(count) => drop(self.output.drain(..count)),
-                Err(error) => return self.judge(&error),
+                Err(error) => return self.classify(&error),
             }
         }
     }
 
-    fn judge(&mut self, error: &io::Error) {
+    fn classify(&mut self, error: &io::Error) {
         use io::ErrorKind::{Interrupted, WouldBlock};
         if !matches!(error.kind(), WouldBlock | Interrupted) {
             self.gone = true;

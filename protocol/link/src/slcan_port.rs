@@ -191,7 +191,7 @@ impl SlcanPort {
                     }
                 }
             }
-            Err(error) => self.judge(error, "read from"),
+            Err(error) => self.classify(error, "read from"),
         }
     }
 
@@ -201,7 +201,7 @@ impl SlcanPort {
             match self.port.write(front) {
                 Ok(0) => return,
                 Ok(count) => drop(self.output.drain(..count)),
-                Err(error) => return self.judge(error, "write to"),
+                Err(error) => return self.classify(error, "write to"),
             }
         }
     }
@@ -212,7 +212,7 @@ impl SlcanPort {
         });
     }
 
-    fn judge(&mut self, error: io::Error, what: &str) {
+    fn classify(&mut self, error: io::Error, what: &str) {
         use io::ErrorKind::{BrokenPipe, ConnectionReset, Interrupted, WouldBlock};
         match error.kind() {
             WouldBlock | Interrupted => {}

@@ -76,7 +76,7 @@ impl SocketCan {
             let (frame, at) = match self.socket.read_frame_with_timestamps() {
                 Ok((frame, times)) => (frame, times.socket.unwrap_or_else(SystemTime::now)),
                 Err(error) => {
-                    self.judge(&error, "read from");
+                    self.classify(&error, "read from");
                     return None;
                 }
             };
@@ -117,14 +117,14 @@ impl SocketCan {
         };
         match written {
             Some(Ok(())) => Ok(()),
-            Some(Err(error)) => Err(self.judge(&error, "write to")),
+            Some(Err(error)) => Err(self.classify(&error, "write to")),
             // Every CanFrame has an equal there.
             None => Err(TransmitError::Offline),
         }
     }
 
     /// What an error of the socket means for a sender; one that ends the link is kept.
-    fn judge(&mut self, error: &io::Error, what: &str) -> TransmitError {
+    fn classify(&mut self, error: &io::Error, what: &str) -> TransmitError {
         match error.raw_os_error().map(Errno::from_raw_os_error) {
             // Queue of the interface, buffer of the socket: full is full.
             Some(Errno::NOBUFS | Errno::AGAIN) => TransmitError::QueueFull,

@@ -94,7 +94,7 @@ pub fn serve<S: Store>(store: &mut S, request: &ParameterRequest) -> Option<Para
     }
     let period = store.period();
     if let Some(value) = new
-        && let Err((error, limit)) = rule.admit(value, period, store.is_at_rest())
+        && let Err((error, limit)) = rule.check_change(value, period, store.is_at_rest())
     {
         return refuse(error, limit);
     }

@@ -1,6 +1,6 @@
 //! The controller's laws as the paper writes them: in continuous time, without friction and rotors.
 
-use firmware::control::laws::{Gains, Memory, Model, Motion, Selection, Situation, Task};
+use firmware::control::laws::{ControlInput, Gains, Memory, Model, Motion, Selection, Task};
 use firmware::mechanics::arm::{ArmModel, DriveTrain, IRB_930};
 use firmware::mechanics::body::Body;
 use firmware::mechanics::kinematics::Trig;
@@ -72,13 +72,13 @@ impl Controller {
             excess: Vector4::zeros(),
         };
         let trig = Trig::new(&q);
-        let situation = Situation {
+        let input = ControlInput {
             motion: &motion,
             task: &Task::new(&ARM.geometry, &trig, &motion),
             model: &Model::new(&self.body, &trig, &motion),
             nominal_inertia: &self.body.nominal_inertia,
         };
-        self.selection.torque(&situation, &mut Memory::new()).cast()
+        self.selection.torque(&input, &mut Memory::new()).cast()
     }
 }
 

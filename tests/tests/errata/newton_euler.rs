@@ -36,7 +36,7 @@ fn f64_bound() -> f64 {
     2.0 * product::RECURSION_ROUNDINGS / U32 * U64 * scale()
 }
 
-fn judge(erratum: u8, misprints: &[Misprint], wrong_by: f64) {
+fn assert_wrong_by(erratum: u8, misprints: &[Misprint], wrong_by: f64) {
     let what = match misprints {
         [one] => format!("torque, {one:?} alone"),
         _ => "torque, recursion as printed".to_owned(),
@@ -63,7 +63,7 @@ fn erratum_31_gravity_has_to_enter_the_recursion() {
     let arm = Arm::with_payload("p10");
     let weight = arm.lifted_mass() * arm.g;
     // Theory: the weight of lift and payload is missing whole. 1e-9 is for rounding.
-    judge(31, &[Misprint::NoGravity], weight * (1.0 - 1e-9));
+    assert_wrong_by(31, &[Misprint::NoGravity], weight * (1.0 - 1e-9));
 }
 
 #[test]
@@ -117,41 +117,41 @@ fn erratum_32_coriolis_term_takes_the_rate_of_the_slide() {
 fn erratum_33_angular_acceleration_mixes_two_frames() {
     // Theory: theta2-double-dot counts with the wrong sign, and wrist inertia of the payload alone makes 10 N m of
     // 2 x 0.05 kg m^2 x 100 rad/s^2.
-    judge(33, &[Misprint::AngularAcceleration], 10.0);
+    assert_wrong_by(33, &[Misprint::AngularAcceleration], 10.0);
 }
 
 #[test]
 fn erratum_34_lever_of_the_centre_of_mass_takes_the_angular_acceleration() {
     // Theory: m lc qdd is replaced by m w a lc; at 10 rad/s and 10 m/s^2 the two differ by the order of 100 N m.
-    judge(34, &[Misprint::ComAcceleration], 100.0);
+    assert_wrong_by(34, &[Misprint::ComAcceleration], 100.0);
 }
 
 #[test]
 fn erratum_35_moment_takes_the_inertia_tensor() {
     // Theory: 0.3 (of metres) for the shaft's 0.00035 kg m^2, at wrist accelerations of hundreds of rad/s^2.
-    judge(35, &[Misprint::LeverForInertia], 10.0);
+    assert_wrong_by(35, &[Misprint::LeverForInertia], 10.0);
 }
 
 #[test]
 fn erratum_36_force_is_carried_over_once() {
     // Theory: the horizontal force of shaft and payload, some 12 kg at 10 m/s^2 and more on a lever of 0.5 m, comes
     // turned by theta4.
-    judge(36, &[Misprint::ForceFrame], 10.0);
+    assert_wrong_by(36, &[Misprint::ForceFrame], 10.0);
 }
 
 #[test]
 fn erratum_37_effort_acts_along_the_axis_of_the_frame_before() {
     // Theory: moments about the far end of a link leave out its whole lever.
-    judge(37, &[Misprint::DistalMoment], 100.0);
+    assert_wrong_by(37, &[Misprint::DistalMoment], 100.0);
 }
 
 #[test]
 fn erratum_46_the_lever_of_a_revolute_joint_turns_with_it() {
     // Theory: the acceleration of the end of arm 1 is zero as printed.
-    judge(46, &[Misprint::OriginAcceleration], 100.0);
+    assert_wrong_by(46, &[Misprint::OriginAcceleration], 100.0);
 }
 
 #[test]
 fn errata_30_to_37_together() {
-    judge(37, &Misprint::ALL, 100.0);
+    assert_wrong_by(37, &Misprint::ALL, 100.0);
 }

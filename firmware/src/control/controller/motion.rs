@@ -5,8 +5,8 @@ use protocol::messages::{Outcome, Refusal, RefusalReason};
 use super::Controller;
 use crate::control::states::{Event, State};
 use crate::trajectory::Reference;
-use crate::trajectory::capacity::Capacity;
 use crate::trajectory::queue::Progress;
+use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Controller {
     /// Refuses what waits to be planned; planned moves go when the arm has come to rest.
@@ -26,12 +26,12 @@ impl Controller {
         if !self.state.is_powered() || !self.queue.has_to_plan() {
             return false;
         }
-        let capacity = Capacity {
+        let budget = TorqueBudget {
             arm: &self.config.arm,
             body: &self.body,
         };
         for _ in 0..self.planning_steps {
-            match self.queue.plan(&capacity) {
+            match self.queue.plan(&budget) {
                 None => {}
                 Some((sequence, answer)) => {
                     let outcome = answer.map_or_else(Outcome::Refused, |()| Outcome::Accepted);

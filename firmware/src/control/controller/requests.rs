@@ -18,7 +18,7 @@ pub(super) enum Answer {
 }
 
 impl Controller {
-    pub(super) fn judge(
+    pub(super) fn accept(
         &mut self,
         sequence: u8,
         request: &MotionRequest,

@@ -7,16 +7,16 @@
 use nalgebra::Vector4;
 use protocol::messages::Compensation;
 
-use super::{Gains, Memory, Situation};
+use super::{ControlInput, Gains, Memory};
 
 /// Joint torques.
 pub fn torque(
-    situation: &Situation<'_>,
+    input: &ControlInput<'_>,
     gains: &Gains,
     compensation: Compensation,
     memory: &mut Memory,
 ) -> Vector4<f32> {
-    let motion = situation.motion;
+    let motion = input.motion;
     let error = motion.position_error();
     let mut acceleration = motion.qd_aheadd
         + motion.velocity_error() * gains.derivative()
@@ -24,19 +24,19 @@ pub fn torque(
     if compensation == Compensation::Integral {
         acceleration += memory.integrate(&error, motion) * gains.integral();
     }
-    realise(situation, &acceleration, gains, compensation, memory)
+    realise(input, &acceleration, gains, compensation, memory)
 }
 
 /// The torques that give the joints `acceleration` in spite of what the model says acts on them
 /// and, with the observer, of what it does not say.
 pub(super) fn realise(
-    situation: &Situation<'_>,
+    input: &ControlInput<'_>,
     acceleration: &Vector4<f32>,
     gains: &Gains,
     compensation: Compensation,
     memory: &mut Memory,
 ) -> Vector4<f32> {
-    let Situation { motion, model, .. } = *situation;
+    let ControlInput { motion, model, .. } = *input;
     let torque = &model.mass * acceleration + model.bias + model.gravity + model.friction;
     if compensation == Compensation::Observer {
         torque - memory.observer.update(motion, model, gains.observer)

@@ -8,16 +8,16 @@
 use nalgebra::Vector4;
 use protocol::messages::Compensation;
 
-use super::{Gains, Memory, Situation, computed_torque};
+use super::{ControlInput, Gains, Memory, computed_torque};
 
 /// Joint torques.
 pub fn torque(
-    situation: &Situation<'_>,
+    input: &ControlInput<'_>,
     gains: &Gains,
     compensation: Compensation,
     memory: &mut Memory,
 ) -> Vector4<f32> {
-    let Situation { motion, task, .. } = *situation;
+    let ControlInput { motion, task, .. } = *input;
     let mut pull = task.velocity * gains.derivative() + task.position * gains.proportional();
     if compensation == Compensation::Integral {
         pull += memory.integrate(&task.position, motion) * gains.integral();
@@ -26,5 +26,5 @@ pub fn torque(
         task.desired.task_velocity(&motion.qd_aheadd) + task.desired.bias(&motion.qd_ahead);
     let carried = task.actual.bias(&motion.measured_qd_ahead());
     let acceleration = task.actual.joint_speed_damped(&(desired - carried + pull));
-    computed_torque::realise(situation, &acceleration, gains, compensation, memory)
+    computed_torque::realise(input, &acceleration, gains, compensation, memory)
 }

@@ -4,11 +4,11 @@
 
 use nalgebra::Vector4;
 
-use super::{Gains, Memory, Situation, velocity_loop};
+use super::{ControlInput, Gains, Memory, velocity_loop};
 
 /// Joint torques of the velocity loop that follows the law's velocities.
-pub fn torque(situation: &Situation<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
-    let motion = situation.motion;
+pub fn torque(input: &ControlInput<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
+    let motion = input.motion;
     let command = motion.mean_qd + motion.position_error() * velocity_loop::outer_gain(gains);
-    velocity_loop::torque(&command, situation, gains, memory)
+    velocity_loop::torque(&command, input, gains, memory)
 }

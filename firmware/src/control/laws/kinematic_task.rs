@@ -5,13 +5,13 @@
 
 use nalgebra::Vector4;
 
-use super::{Gains, Memory, Situation, velocity_loop};
+use super::{ControlInput, Gains, Memory, velocity_loop};
 
 /// Joint torques of the velocity loop that follows the law's velocities.
-pub fn torque(situation: &Situation<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
-    let task = situation.task;
-    let velocity = task.desired.task_velocity(&situation.motion.mean_qd)
+pub fn torque(input: &ControlInput<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
+    let task = input.task;
+    let velocity = task.desired.task_velocity(&input.motion.mean_qd)
         + task.position * velocity_loop::outer_gain(gains);
     let command = task.actual.joint_speed_damped(&velocity);
-    velocity_loop::torque(&command, situation, gains, memory)
+    velocity_loop::torque(&command, input, gains, memory)
 }

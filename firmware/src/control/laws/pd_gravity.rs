@@ -6,12 +6,12 @@
 
 use nalgebra::Vector4;
 
-use super::{Gains, Situation};
+use super::{ControlInput, Gains};
 
 /// Joint torques; the gain matrices are nominal inertias times Kp and Kd.
-pub fn torque(situation: &Situation<'_>, gains: &Gains) -> Vector4<f32> {
-    let motion = situation.motion;
+pub fn torque(input: &ControlInput<'_>, gains: &Gains) -> Vector4<f32> {
+    let motion = input.motion;
     let acceleration = motion.position_error() * gains.proportional()
         + motion.velocity_error() * gains.derivative();
-    situation.nominal_inertia.component_mul(&acceleration) + situation.model.gravity
+    input.nominal_inertia.component_mul(&acceleration) + input.model.gravity
 }

@@ -3,15 +3,15 @@
 
 use nalgebra::Vector4;
 
-use super::{Gains, Memory, Situation};
+use super::{ControlInput, Gains, Memory};
 
 /// Joint torques: nominal inertia times (Kp e + Ki integral e + Kd e').
-pub fn torque(situation: &Situation<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
-    let motion = situation.motion;
+pub fn torque(input: &ControlInput<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
+    let motion = input.motion;
     let error = motion.position_error();
     let integral = memory.integrate(&error, motion);
     let acceleration = error * gains.proportional()
         + motion.velocity_error() * gains.derivative()
         + integral * gains.integral();
-    situation.nominal_inertia.component_mul(&acceleration)
+    input.nominal_inertia.component_mul(&acceleration)
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector4;
 
-use super::{Gains, Memory, Situation};
+use super::{ControlInput, Gains, Memory};
 
 /// Joint torques that make the joints follow the velocities `command` (means over a sample).
 ///
@@ -10,15 +10,15 @@ use super::{Gains, Memory, Situation};
 /// four time constants of the loop, the usual compromise of overshoot and stiffness.
 pub(super) fn torque(
     command: &Vector4<f32>,
-    situation: &Situation<'_>,
+    input: &ControlInput<'_>,
     gains: &Gains,
     memory: &mut Memory,
 ) -> Vector4<f32> {
     let gain = gains.derivative();
-    let error = command - situation.motion.qd;
-    let integral = memory.integrate(&error, situation.motion);
+    let error = command - input.motion.qd;
+    let integral = memory.integrate(&error, input.motion);
     let acceleration = error * gain + integral * (0.25 * gain * gain);
-    situation.nominal_inertia.component_mul(&acceleration) + situation.model.gravity
+    input.nominal_inertia.component_mul(&acceleration) + input.model.gravity
 }
 
 /// Position gain of a kinematic law around this loop, 1/s: a quarter of the inner bandwidth, so

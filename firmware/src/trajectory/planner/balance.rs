@@ -4,14 +4,14 @@ use protocol::messages::Refusal;
 
 use super::{BALANCE_POINTS, Planner, STEP, Stage, fill};
 use crate::mechanics::arm::ArmModel;
-use crate::trajectory::capacity::Capacity;
 use crate::trajectory::path::Path;
+use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Planner {
     /// One sample of one half; at the end of a round, new accelerations.
     pub(super) fn balance(
         &mut self,
-        capacity: &Capacity<'_>,
+        budget: &TorqueBudget<'_>,
         round: u8,
         point: u8,
         gain: [f32; 2],
@@ -25,9 +25,9 @@ impl Planner {
             (0.0, profile.accelerate_end())
         };
         let along = profile.at(from + share * (to - from));
-        let here = self.point(capacity.arm, along.s)?;
+        let here = self.point(budget.arm, along.s)?;
         let [mut speeding_gain, mut braking_gain] = gain;
-        let room = capacity.acceleration_room(&here, &along);
+        let room = budget.acceleration_room(&here, &along);
         if braking {
             braking_gain = braking_gain.min(room);
         } else {
@@ -42,7 +42,7 @@ impl Planner {
             return Ok(());
         }
         let (up, down) = profile.peaks();
-        let ceiling = self.acceleration_ceiling(capacity.arm);
+        let ceiling = self.acceleration_ceiling(budget.arm);
         let correct = |peak: f32, gain: f32| (peak * gain.max(1.0 / STEP)).min(ceiling);
         self.bounds.accelerate = correct(up, speeding_gain);
         self.bounds.brake = correct(down, braking_gain);

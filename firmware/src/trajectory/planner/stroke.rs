@@ -2,18 +2,18 @@
 
 use super::{NO_TRAVEL, Planner, Stage};
 use crate::trajectory::Lift;
-use crate::trajectory::capacity::Capacity;
 use crate::trajectory::path::Path;
 use crate::trajectory::profile::{Bounds, SCurve};
+use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Planner {
     /// The profile of one vertical stroke.
-    pub(super) fn stroke(&mut self, capacity: &Capacity<'_>, down: bool) {
+    pub(super) fn stroke(&mut self, budget: &TorqueBudget<'_>, down: bool) {
         let (Some(gate), Path::Joint { start, .. }) = (self.gate, &self.draft.path) else {
             self.stage = Stage::Compose { round: 0 };
             return;
         };
-        let (up_bounds, down_bounds) = capacity.lift(gate.rise.max(gate.fall));
+        let (up_bounds, down_bounds) = budget.lift(gate.rise.max(gate.fall));
         let lift = self.draft.lift.get_or_insert(Lift {
             from: start.z,
             up: SCurve::default(),

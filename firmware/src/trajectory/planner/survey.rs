@@ -4,17 +4,17 @@ use nalgebra::Vector4;
 use protocol::messages::Refusal;
 
 use super::{Planner, SURVEY_POINTS, Stage, fill};
-use crate::trajectory::capacity::Capacity;
 use crate::trajectory::path::{Path, PathPoint, check_limits};
 use crate::trajectory::profile::Sample;
 use crate::trajectory::request::from_ik;
+use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Planner {
     /// Reach, limits and the largest joint travel per unit of path; at the ends also the accelerations
     /// from rest that torque allows, a start for the rounds.
     pub(super) fn survey(
         &mut self,
-        capacity: &Capacity<'_>,
+        budget: &TorqueBudget<'_>,
         point: u8,
         fastest: Vector4<f32>,
     ) -> Result<(), Refusal> {
@@ -24,13 +24,13 @@ impl Planner {
             Path::Line { .. } => SURVEY_POINTS,
         };
         let s = f32::from(point) / f32::from(points);
-        let here = self.point(capacity.arm, s)?;
-        check_limits(capacity.arm, &here.q).map_err(from_ik)?;
-        let limits = &capacity.arm.limits;
+        let here = self.point(budget.arm, s)?;
+        check_limits(budget.arm, &here.q).map_err(from_ik)?;
+        let limits = &budget.arm.limits;
         let fastest = fastest.sup(&here.dq.abs());
         if point == 0 {
-            capacity.check_creep()?;
-            self.bounds.accelerate = self.acceleration_from_rest(capacity, &here);
+            budget.check_creep()?;
+            self.bounds.accelerate = self.acceleration_from_rest(budget, &here);
         }
         if point < points {
             self.stage = Stage::Survey {
@@ -39,9 +39,9 @@ impl Planner {
             };
             return Ok(());
         }
-        self.bounds.brake = self.acceleration_from_rest(capacity, &here);
+        self.bounds.brake = self.acceleration_from_rest(budget, &here);
         self.bounds.jerk = fill(&limits.jerk, &fastest);
-        self.bounds.speed = fill(&capacity.speed(), &fastest);
+        self.bounds.speed = fill(&budget.speed(), &fastest);
         if self.bounds.speed == f32::MAX {
             // Nothing travels along the path: at most the lift of a jump moves.
             self.bounds.speed = 0.0;
@@ -55,12 +55,16 @@ impl Planner {
     }
 
     /// The path acceleration at which a joint at rest reaches its limit of torque or acceleration.
-    pub(super) fn acceleration_from_rest(&self, capacity: &Capacity<'_>, here: &PathPoint) -> f32 {
-        let a = fill(&capacity.arm.limits.acceleration, &here.dq);
+    pub(super) fn acceleration_from_rest(
+        &self,
+        budget: &TorqueBudget<'_>,
+        here: &PathPoint,
+    ) -> f32 {
+        let a = fill(&budget.arm.limits.acceleration, &here.dq);
         let along = Sample {
             a,
             ..Sample::default()
         };
-        a * capacity.acceleration_room(here, &along).min(1.0)
+        a * budget.acceleration_room(here, &along).min(1.0)
     }
 }

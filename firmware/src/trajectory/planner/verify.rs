@@ -5,9 +5,9 @@ use protocol::messages::Refusal;
 
 use super::{Planner, Stage};
 use crate::trajectory::Trajectory;
-use crate::trajectory::capacity::Capacity;
 use crate::trajectory::path::Path;
 use crate::trajectory::request::from_path;
+use crate::trajectory::torque_budget::TorqueBudget;
 
 /// Steps of the last pass, at the most, between the borders of segments; along a line more, since there the joints have
 /// extremes of their own.
@@ -20,45 +20,49 @@ impl Planner {
     /// One sample of the whole move.
     pub(super) fn verify(
         &mut self,
-        capacity: &Capacity<'_>,
+        budget: &TorqueBudget<'_>,
         t: f32,
-        rate: f32,
+        time_scale: f32,
         before: Option<(f32, Vector4<f32>)>,
     ) -> Result<(), Refusal> {
-        let mut reference = self.draft.at(capacity.arm, t).map_err(from_path)?;
-        let mut rate = rate.min(capacity.torque_scale(&reference));
+        let mut reference = self.draft.at(budget.arm, t).map_err(from_path)?;
+        let mut time_scale = time_scale.min(budget.torque_scale(&reference));
         if matches!(self.draft.path, Path::Line { .. }) {
             // The joint accelerations bend between the samples, and the jerk has a part that only
             // their difference shows.
             if let Some((earlier, qdd)) = before {
                 reference.qddd = (reference.qdd - qdd) / (t - earlier);
             }
-            rate = rate.min(capacity.rate_scale(&reference, LINE_SHARE));
+            time_scale = time_scale.min(budget.derivative_scale(&reference, LINE_SHARE));
         } else {
             // Each joint keeps its own limits by how its profile was made. Lift and wrist share a
             // motor.
-            rate = rate.min(capacity.lift_motor_scale(&reference.qd));
+            time_scale = time_scale.min(budget.lift_motor_scale(&reference.qd));
         }
         self.draft.braking = self.draft.braking.sup(&reference.qdd.abs());
         self.stage = if t < self.draft.span {
             Stage::Verify {
                 t: self.next_sample(t),
-                rate,
+                time_scale,
                 before: Some((t, reference.qdd)),
             }
         } else {
-            Stage::Finish { rate }
+            Stage::Finish { time_scale }
         };
         Ok(())
     }
 
     /// Makes the trajectory of the draft.
-    pub(super) fn finish(&mut self, capacity: &Capacity<'_>, rate: f32) -> Result<(), Refusal> {
+    pub(super) fn finish(
+        &mut self,
+        budget: &TorqueBudget<'_>,
+        time_scale: f32,
+    ) -> Result<(), Refusal> {
         // Past the end, so that rounding of the last sample cannot leave the arm short of it.
         let past = self.draft.span + 1.0;
-        self.draft.end = self.draft.at(capacity.arm, past).map_err(from_path)?.q;
-        self.draft.braking *= rate * rate;
-        self.draft.rate = rate * self.speed;
+        self.draft.end = self.draft.at(budget.arm, past).map_err(from_path)?.q;
+        self.draft.braking *= time_scale * time_scale;
+        self.draft.time_scale = time_scale * self.speed;
         self.stage = Stage::Idle;
         Ok(())
     }

@@ -3,7 +3,7 @@
 use protocol::messages::{Mode, MotionRequest};
 use protocol::time::Duration;
 
-use super::Hand;
+use super::CellEvent;
 use crate::scenario::{PayloadSpec, Scenario, Step};
 
 /// Wait after enabling, until brake and observer have come to rest.
@@ -17,7 +17,7 @@ pub(super) enum Action {
     WaitMode(Mode),
     WaitArrived,
     Dwell(Duration),
-    Hand(Hand),
+    Cell(CellEvent),
 }
 
 /// Everything to do, in order.
@@ -54,7 +54,7 @@ pub(super) fn program(scenario: &Scenario) -> Vec<Action> {
     }
     if let Some(payload) = &scenario.payload {
         actions.extend([
-            Action::Hand(Hand::Attach(carried(payload))),
+            Action::Cell(CellEvent::Attach(carried(payload))),
             announce(payload),
         ]);
     }
@@ -64,7 +64,7 @@ pub(super) fn program(scenario: &Scenario) -> Vec<Action> {
         Action::Dwell(SETTLING),
     ]);
     for _ in 0..scenario.cycles {
-        actions.push(Action::Hand(Hand::BeginCycle));
+        actions.push(Action::Cell(CellEvent::BeginCycle));
         for step in &scenario.cycle {
             match step {
                 Step::Jump(jump) => actions.push(Action::Request(MotionRequest::Jump {
@@ -91,17 +91,17 @@ pub(super) fn program(scenario: &Scenario) -> Vec<Action> {
                 ]),
                 Step::Pick(payload) => actions.extend([
                     Action::WaitArrived,
-                    Action::Hand(Hand::Attach(carried(payload))),
+                    Action::Cell(CellEvent::Attach(carried(payload))),
                     announce(payload),
                 ]),
                 Step::Place {} => actions.extend([
                     Action::WaitArrived,
-                    Action::Hand(Hand::Release),
+                    Action::Cell(CellEvent::Release),
                     announce(&nothing),
                 ]),
             }
         }
-        actions.extend([Action::WaitArrived, Action::Hand(Hand::EndCycle)]);
+        actions.extend([Action::WaitArrived, Action::Cell(CellEvent::EndCycle)]);
     }
     actions.extend([
         Action::Request(MotionRequest::Disable),

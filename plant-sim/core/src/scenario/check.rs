@@ -81,7 +81,7 @@ impl Scenario {
                                 &key,
                                 format!("a payload of {} kg", payload.mass),
                                 format!(
-                                    "a hand that is empty; it holds {} kg, so place that first",
+                                    "an empty gripper; it holds {} kg, so place that first",
                                     held.mass
                                 ),
                             ));
@@ -92,7 +92,7 @@ impl Scenario {
                         return Err(self.wrong(
                             &format!("cycle[{index}].place"),
                             "nothing",
-                            "a hand that holds something: pick it first",
+                            "a gripper that holds something: pick it first",
                         ));
                     }
                     _ => {}

@@ -83,7 +83,7 @@ impl Tally {
         match codec::decode(frame) {
             Ok(received) => {
                 if let (Some(counter), Some(receiver)) = (received.counter, &mut self.receiver) {
-                    match receiver.judge(counter) {
+                    match receiver.check(counter) {
                         Verdict::Initial | Verdict::Fresh => {}
                         Verdict::Lost(frames) => self.lost += u64::from(frames),
                         Verdict::Duplicate => self.duplicate += 1,

@@ -14,7 +14,7 @@ use crate::trajectory::Reference;
 
 /// Everything that a law may use.
 #[derive(Clone, Copy, Debug)]
-pub struct Situation<'a> {
+pub struct ControlInput<'a> {
     /// Motion in joint space, measured and wanted.
     pub motion: &'a Motion<'a>,
     /// The same in task space.

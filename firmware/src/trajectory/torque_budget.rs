@@ -17,14 +17,14 @@ pub const TORQUE_SHARE: f32 = 0.93;
 
 /// The limits of one arm with one payload, as the planner uses them.
 #[derive(Clone, Copy, Debug)]
-pub struct Capacity<'a> {
+pub struct TorqueBudget<'a> {
     /// The robot.
     pub arm: &'a ArmModel,
     /// Its dynamics with the payload that it will carry.
     pub body: &'a Body,
 }
 
-impl Capacity<'_> {
+impl TorqueBudget<'_> {
     /// By what factor the path acceleration of `along` could grow before the first joint torque
     /// reaches its share; huge where the sample needs hardly any.
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
@@ -128,7 +128,7 @@ impl Capacity<'_> {
 
     /// The largest time scale, at most 1, at which `reference` uses no more than `share` of the limits
     /// of speed, acceleration and jerk.
-    pub fn rate_scale(&self, reference: &Reference, share: f32) -> f32 {
+    pub fn derivative_scale(&self, reference: &Reference, share: f32) -> f32 {
         let limits = &self.arm.limits;
         let speed = ratio(&(limits.velocity * share), &reference.qd);
         let motor = ratio(
