@@ -1,8 +1,8 @@
-//! What the controller decides in one sample: its state, the motion it follows, the law that follows it, and what it trips on.
+//! One sample of control: states, motion, control laws, limits and faults.
 //!
-//! [`controller`] joins the parts; each of the others is pure: [`states`] the states, [`laws`] the control laws, [`limits`] what
-//! a motor can give, [`monitor`] what counts as a fault, [`fault`] what is done about it,
-//! [`setup`] what can be changed meanwhile. [`phase`] is the probe that measures what each part costs. Leans on
+//! [`controller`] joins the parts; each of the others is pure: [`states`] the states, [`laws`] the control laws,
+//! [`limits`] what a motor can give, [`monitor`] what counts as a fault, [`fault`] the reaction to it, [`setup`] what
+//! can be changed at run time. [`phase`] is the probe that measures what each part costs. Depends on
 //! [`mechanics`](crate::mechanics) and [`trajectory`](crate::trajectory).
 
 /// Declares an enumeration and the list of its variants together, so that the list cannot miss one.

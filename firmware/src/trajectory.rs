@@ -1,11 +1,11 @@
 //! Motion: from a request to a reference for every sample.
 //!
 //! ```text
-//! request -> planner (a bounded piece of work a tick) -> Trajectory -> Clock -> Reference
+//! request -> planner (bounded work per tick) -> Trajectory -> Clock -> Reference
 //! ```
 //!
 //! A [`Trajectory`] is a closed form: a path, a jerk-limited time law along it, for a jump a lift
-//! profile laid over it, and one time scale that scales all of it in time. Nothing is tabulated, so it
+//! profile superimposed on it, and one time scale for all of it. Nothing is tabulated, so it
 //! costs a few hundred bytes and can be evaluated at any instant and any control rate.
 
 pub mod clock;
@@ -67,19 +67,19 @@ pub struct Trajectory {
     pub path: Path,
     /// Time law along the path.
     pub profile: SCurve,
-    /// Time at which the motion along the path begins, s (later than 0 in a jump).
+    /// Time at which the motion along the path begins, s (above 0 in a jump).
     pub start: f32,
     /// Vertical part of a jump.
     pub lift: Option<Lift>,
-    /// Length before scaling, s.
+    /// Duration before scaling, s.
     pub span: f32,
     /// Time scale, 0 < scale <= 1: the move lasts `span / time_scale`.
     pub time_scale: f32,
-    /// Largest joint accelerations of the move at full speed: what a stop may brake with.
+    /// Largest joint accelerations of the move at full speed: those a stop may use for braking.
     pub braking: Vector4<f32>,
     /// Joint positions at the end.
     pub end: Vector4<f32>,
-    /// Number by which the operator knows the move.
+    /// Sequence number that the operator gave the move.
     pub sequence: u8,
 }
 
@@ -92,12 +92,12 @@ impl Trajectory {
     /// Reference at `t` seconds after the start, held at both ends.
     ///
     /// # Errors
-    /// A line that the planner has not surveyed may leave the reach; a planned one cannot.
+    /// A line that has not been surveyed by the planner may leave the reach; a planned one cannot.
     pub fn at(&self, arm: &ArmModel, t: f32) -> Result<Reference, PathError> {
         let t = t * self.time_scale;
         let Sample { s, v, a, j } = self.profile.at(t - self.start);
         let mut reference = match &self.path {
-            // As below, without what is zero: nearly every move is one of these.
+            // The same as below without the terms that are zero here: nearly every move is of this kind.
             Path::Joint { start, delta } => Reference {
                 q: start + delta * s,
                 qd: delta * v,
@@ -110,7 +110,7 @@ impl Trajectory {
                     q,
                     qd: dq * v,
                     qdd: dq * a + ddq * (v * v),
-                    // The third path derivative is left out: it feeds only the sub-sample extrapolation.
+                    // The third path derivative is left out: it only feeds the extrapolation within a sample.
                     qddd: dq * j + ddq * (3.0 * v * a),
                 }
             }

@@ -4,8 +4,8 @@
 //! readings -> joints -> monitor -> state -> reference -> control law -> torque limits -> torques
 //! ```
 //!
-//! There is one call and it is total: every input gives an output, the work is bounded, nothing
-//! is allocated and no clock is read. Time is the number of samples.
+//! There is one call, and it is total: every input gives an output. The work is bounded, nothing is allocated and no
+//! clock is read: time is counted in samples.
 
 mod motion;
 mod parameters;
@@ -35,9 +35,9 @@ use crate::trajectory::Reference;
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use requests::Answer;
 
-/// Steps of planning for each millisecond of the sampling period.
+/// Planning steps per millisecond of the sampling period.
 const PLANNING_STEPS_PER_MS: f32 = 1.0;
-/// Most steps of planning in a sample: at 100 Hz and slower, planning is as fast as at 100 Hz.
+/// Most planning steps per sample: below 100 Hz, planning is no faster than at 100 Hz.
 const MAX_PLANNING_STEPS: f32 = 10.0;
 
 /// Configuration, fixed at start.
@@ -47,11 +47,11 @@ pub struct Config {
     pub arm: ArmModel,
     /// Sampling period.
     pub period: Period,
-    /// What can be changed later, as it is at the start.
+    /// Initial values of what can be changed at run time.
     pub setup: Setup,
 }
 
-/// The part of the configuration that stays.
+/// The part of the configuration that never changes.
 #[derive(Clone, Copy, Debug)]
 struct Fixed {
     arm: ArmModel,
@@ -94,7 +94,7 @@ pub struct Actions {
 }
 
 /// The controller of one arm.
-// In this order all that a sample looks at lies within reach of one base register; the queue is longer than that.
+// The order keeps everything that a sample reads within reach of one base register; the queue alone exceeds that reach.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Controller {
@@ -104,13 +104,13 @@ pub struct Controller {
     state: State,
     /// Samples that a gap in the feedback may span.
     max_gap: u32,
-    /// Planning steps in a sample.
+    /// Planning steps per sample.
     planning_steps: u8,
-    /// What the law had to be cut by since this was last taken.
+    /// Limits that have acted since this was last taken.
     limits: LimitFlags,
     /// First fault since the last reset.
     fault: Fault,
-    /// A fault that the peers do not know of yet.
+    /// A fault not reported to the peers yet.
     alarm: Option<Fault>,
     /// The reference of the last sample, as handed to the law.
     reference: Reference,
@@ -124,9 +124,9 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller in self-test. The model should have passed [`ArmModel::validate`]; one that
-    /// has not never leaves self-test.
-    // Out of line it is built in place; inlined it would take its own size once more on the stack.
+    /// A controller in self-test. The model should have passed [`ArmModel::validate`]; with one that
+    /// has not, the controller never leaves self-test.
+    // Out of line it is built in place; inlined it would take its size on the stack a second time.
     #[inline(never)]
     pub fn new(config: Config) -> Self {
         Self {
@@ -177,7 +177,7 @@ impl Controller {
         self.fault.cause
     }
 
-    /// A fault that the peers do not know of yet; each is handed out once.
+    /// A fault not reported to the peers yet; each is returned once.
     pub fn take_alarm(&mut self) -> Option<Fault> {
         self.alarm.take()
     }
@@ -207,7 +207,7 @@ impl Controller {
         &self.error
     }
 
-    /// Every limit that has acted since this was asked for last.
+    /// Every limit that has acted since the last call.
     pub fn take_limits(&mut self) -> LimitFlags {
         core::mem::take(&mut self.limits)
     }
@@ -217,7 +217,7 @@ impl Controller {
         self.queue.len()
     }
 
-    /// Whether a move is being planned: what makes a sample expensive.
+    /// Whether a move is being planned, which makes a sample expensive.
     pub fn is_planning(&self) -> bool {
         self.queue.is_planning()
     }
@@ -227,28 +227,28 @@ impl Controller {
         self.queue.completed()
     }
 
-    /// Answers that are due.
+    /// Number of replies to send.
     pub fn answers_waiting(&self) -> usize {
         self.replies.len()
     }
 
-    /// Requests that got no answer, since too many others waited for theirs.
+    /// Requests that were never answered, because too many replies were waiting.
     pub fn unanswered(&self) -> u16 {
         self.unanswered
     }
 
-    /// An answer to an operator that is due.
+    /// The next reply to send to an operator.
     pub fn take_reply(&mut self) -> Option<MotionReply> {
         self.replies.pop_front()
     }
 
-    /// Answers a request without looking at it further.
+    /// Refuses a request without examining it further.
     pub fn refuse(&mut self, sequence: u8, refusal: Refusal) {
         self.reply(sequence, Outcome::Refused(refusal));
     }
 
-    /// Takes an operator's request. Answers follow by [`Controller::take_reply`]: at once, or for
-    /// a move when it has been planned.
+    /// Accepts or refuses an operator's request. [`Controller::take_reply`] has the answer at once, or for a move once
+    /// it has been planned.
     pub fn request(&mut self, sequence: u8, request: &MotionRequest) {
         match self.accept(sequence, request) {
             Ok(Answer::Now) => self.reply(sequence, Outcome::Accepted),
@@ -258,7 +258,7 @@ impl Controller {
     }
 
     /// One sample. Worst case: one trajectory evaluation and one control law. Planning is not part
-    /// of it: [`Controller::plan`] follows when the command is on its way.
+    /// of it: call [`Controller::plan`] once the command is on its way.
     pub fn step<P: Probe>(&mut self, readings: &Readings, probe: &mut P) -> Actions {
         let drive = &self.body.drive;
         let q = drive.joint_angle(&drive.motor_angle_of_counts(&readings.counts));
@@ -271,7 +271,7 @@ impl Controller {
         self.watch(readings.status, &q, &qd);
         self.wait(readings.steps);
         if !self.state.is_powered() {
-            // No torque: follow the arm, so that switching on starts where it stands.
+            // No torque: follow the arm, so that enabling starts at its present position.
             self.reference = Reference::rest(q);
             self.queue.clear(&q);
             self.error = Vector4::zeros();
@@ -308,12 +308,12 @@ impl Controller {
             nominal_inertia: &self.body.nominal_inertia,
         };
         if self.state.is_braking() {
-            // The brake holds: what it carries must not be taken for a disturbance.
+            // The brake holds: the load it carries must not be mistaken for a disturbance.
             self.memory = Memory::new();
         }
         let torque = self.setup.selection.torque(&input, &mut self.memory);
         if !torque.iter().all(|torque| torque.is_finite()) {
-            // Nothing finite that comes in leads here; should it happen, the brake is the answer.
+            // No finite input leads here; should it happen, close the brake.
             self.memory = Memory::new();
             self.fail(Fault::because(Cause::BadValue));
             return self.torque_off();
@@ -329,7 +329,7 @@ impl Controller {
         }
     }
 
-    /// The drives let go; the brake holds the lift.
+    /// Torque off; the brake holds the lift.
     fn torque_off(&self) -> Actions {
         Actions {
             control: self.control_word(),
@@ -339,7 +339,7 @@ impl Controller {
 
     fn reply(&mut self, sequence: u8, outcome: Outcome) {
         let reply = MotionReply { sequence, outcome };
-        // The outbox holds an answer to everything that can wait to be planned, and as many again.
+        // The outbox has room for the replies to everything that can wait to be planned, and as many again.
         if self.replies.push_back(reply).is_err() {
             self.unanswered = self.unanswered.saturating_add(1);
         }

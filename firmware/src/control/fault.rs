@@ -1,62 +1,62 @@
-//! What becomes of a fault: one row for each cause, with its limit, its reactions and what clears it.
+//! The fault table: one row per cause, with its limit, its reactions and what clears it.
 //!
 //! The reaction depends on what can still be trusted:
 //!
-//! * A controlled stop closes the loop through the encoders. An encoder that is lost or lies never gets one: a motor's
-//!   commutation hangs on its encoder as well, so that not even an open-loop torque would go where it is meant. Brake and
+//! * A controlled stop closes the loop through the encoders. A lost or wrong encoder therefore rules it out: the
+//!   motor's commutation depends on the encoder too, so not even an open-loop torque would act as intended. Brake and
 //!   torque off, at once.
-//! * A stop is watched like a move. What is found while the arm stops closes the brake in the same sample; torque carries
-//!   the lift until the brake holds it.
-//! * An axis that follows not even while the brake closes has shown that its loop does not work: torque off.
-//! * A drive in fault may be that of the lift, whose load nothing but the brake holds then: brake first.
+//! * A stop is watched like a move. A fault found while the arm stops closes the brake in the same sample; torque
+//!   carries the lift until the brake holds it.
+//! * An axis that does not follow even while the brake closes has a loop that does not work: torque off.
+//! * A drive in fault may be the one of the lift, whose load then only the brake can hold: brake first.
 //!
-//! The limits are the defaults of parameters. `docs/safety.md` has the same table; the test `faults` compares the two.
+//! The limits are the defaults of parameters. The test `faults` compares this table with the one in `docs/safety.md`.
 
 use protocol::messages::Cause;
 use protocol::parameters::ControllerParameter as Parameter;
 
 use super::states::{Event, Halt, State};
 
-/// Longest gap in the feedback that the trajectory is continued through, ms. Within it an arm at full speed strays by less
+/// Longest gap in the feedback across which the trajectory continues, ms. Within it an arm at full speed strays by less
 /// than the following error allows: 60 rad/s² x (5 ms)² / 2 is 0.75 mrad at the shoulder.
 pub const MAX_GAP_MS: u32 = milliseconds(Parameter::FeedbackGap);
 /// Age of the feedback at which the drives count as silent, ms: the watchdog time of moteus and the heartbeat of ODrive.
-/// The drives have let go long before, after 5 samples without a command.
+/// The drives have switched off long before, after 5 samples without a command.
 pub const PEER_TIMEOUT_MS: u32 = milliseconds(Parameter::FeedbackTimeout);
-/// Rejected, stale or repeated feedback frames in a row that stop the arm: two can be noise, and even at 500 Hz three last
-/// no longer than a gap may.
+/// Consecutive rejected, stale or repeated feedback frames that stop the arm: two can be noise, and even at 500 Hz
+/// three last no longer than an allowed gap.
 pub const BAD_FRAMES: u8 = Parameter::BadFrames.initial(1.0) as u8;
 
-/// Default of a parameter in s.
+/// Default of a parameter given in s, in ms.
 const fn milliseconds(parameter: Parameter) -> u32 {
     (parameter.initial(1.0) * 1e3 + 0.5) as u32
 }
 
-/// How much of something is a fault.
+/// How much of a violation is a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
     /// Any of it.
     AtOnce,
     /// Longer than this, ms.
     Milliseconds(u32),
-    /// So many frames in a row.
+    /// This many frames in a row.
     Frames(u8),
-    /// [`MonitorLimits`](super::monitor::MonitorLimits): a number for each axis, in so many samples in a row.
+    /// [`MonitorLimits`](super::monitor::MonitorLimits): a limit per axis, for a number of consecutive samples.
     EachAxis,
 }
 
-/// What is done about a fault.
+/// Reaction to a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
-    /// Nothing more than what goes on.
+    /// Nothing beyond what is already going on.
     None,
     /// Controlled stop, brake, torque off.
     Stop,
-    /// Brake at once; torque off when it has closed.
+    /// Brake at once; torque off once it has closed.
     Brake,
     /// Brake and torque off at once.
     Off,
-    /// As a stop, into the state that only the end of the emergency leaves.
+    /// Like a stop, into the state that only the end of the emergency leaves.
     EmergencyStop,
 }
 
@@ -65,7 +65,7 @@ pub enum Reaction {
 pub enum Latch {
     /// An operator's reset.
     Reset,
-    /// A new start of the controller.
+    /// A restart of the controller.
     Restart,
 }
 
@@ -76,7 +76,7 @@ pub struct Row {
     pub cause: Cause,
     /// How much of it is a fault.
     pub limit: Limit,
-    /// Reaction of an arm that works.
+    /// Reaction in normal operation.
     pub reaction: Reaction,
     /// Reaction while it stops for another fault.
     pub stopping: Reaction,
@@ -102,7 +102,7 @@ const fn row(
     }
 }
 
-/// Every cause that is raised.
+/// Every cause that the controller raises.
 pub static REACTIONS: [Row; 12] = {
     use Latch::{Reset, Restart};
     use Limit::{AtOnce, EachAxis, Frames, Milliseconds};
@@ -133,11 +133,11 @@ pub static REACTIONS: [Row; 12] = {
             [Stop, Brake, None],
             Reset,
         ),
-        // The checksum was right: it is the sender that is wrong, or this controller's own arithmetic.
+        // The checksum was right: the sender is wrong, or this controller's own arithmetic.
         row(Cause::BadValue, Frames(BAD_FRAMES), [Off, Off, Off], Reset),
         row(Cause::FollowingError, EachAxis, [Stop, Brake, Off], Reset),
         row(Cause::OverSpeed, EachAxis, [Stop, Brake, Off], Reset),
-        // An arm beyond its range stays there while it stops: that says nothing new.
+        // An arm beyond its range stays there while it stops: no new information.
         row(Cause::SoftLimit, EachAxis, [Stop, None, None], Reset),
         row(
             Cause::EStop,
@@ -150,7 +150,7 @@ pub static REACTIONS: [Row; 12] = {
     ]
 };
 
-/// What a fault of this cause leads to in `state`.
+/// The event that a fault of this cause raises in `state`.
 pub(super) fn event(cause: Cause, state: State) -> Option<Event> {
     let row = REACTIONS.iter().find(|row| row.cause == cause)?;
     let reaction = match state.halt() {

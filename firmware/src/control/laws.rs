@@ -30,8 +30,8 @@ use serde::{Deserialize, Serialize};
 pub use control_input::{ControlInput, Model, Motion, Task};
 use observer::MomentumObserver;
 
-/// Closed-loop gains, the same three numbers for every law and every robot: they are turned into
-/// accelerations, and inertia turns those into torque.
+/// Closed-loop gains, the same three numbers for every law and every robot: they yield accelerations, and inertia turns
+/// those into torque.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gains {
     /// Natural frequency of the error dynamics, rad/s.
@@ -43,8 +43,8 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// Defaults of the parameter table, for an arm as stiff as the model says that is sampled every `period` seconds:
-    /// reduced where the sampling delay requires it.
+    /// Defaults of the parameter table, for an arm as stiff as the model says, reduced where the delay of sampling
+    /// every `period` seconds requires it.
     pub fn for_period(period: f32) -> Self {
         Self {
             bandwidth: Parameter::Bandwidth.initial(period),
@@ -57,7 +57,7 @@ impl Gains {
     ///
     /// # Errors
     /// [`RefusalReason::OutOfRange`] with the gain and its bound: a bandwidth or observer corner
-    /// above a quarter radian a sample leaves no phase for the delays of sampling and bus.
+    /// above a quarter radian per sample leaves no phase margin for the delays of sampling and bus.
     pub fn check(&self, period: f32) -> Result<(), Refusal> {
         for (value, parameter) in [
             (self.bandwidth, Parameter::Bandwidth),
@@ -125,7 +125,7 @@ impl Default for Memory {
     }
 }
 
-/// A law, what helps it against friction and payload error, and its gains.
+/// A law, its compensation of friction and payload error, and its gains.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Selection {
     /// The law.

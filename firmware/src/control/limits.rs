@@ -1,6 +1,6 @@
-//! Torque limits: what a law asks for, cut to what joints and motors can give.
+//! Torque limits: the output of a law, cut to what joints and motors can give.
 //!
-//! Saturation is not a fault: a cut is a flag in the state message and holds the integrals, no more.
+//! Saturation is not a fault: a cut only sets a flag in the state message and holds the integrals.
 
 use nalgebra::Vector4;
 use protocol::messages::LimitFlags;
@@ -9,7 +9,7 @@ use crate::mechanics::arm::ArmModel;
 use crate::mechanics::dynamics::drive::Drive;
 use crate::mechanics::math::clamp;
 
-/// Torques within every limit, and what that took.
+/// Torques within every limit, and what was cut off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limited {
     /// Motor torques, N m.
@@ -17,7 +17,7 @@ pub struct Limited {
     /// What was cut off, at the joint or else at the motor (N m, lift N): with the sign of the torque, 0 where
     /// nothing was.
     pub excess: Vector4<f32>,
-    /// Torque of which axes was cut.
+    /// Axes whose torque was cut.
     pub flags: LimitFlags,
 }
 
@@ -48,7 +48,7 @@ pub fn cut(arm: &ArmModel, drive: &Drive, torque: &Vector4<f32>) -> Limited {
     }
 }
 
-/// `torque` cut to a magnitude; a NaN stays one.
+/// `torque` cut to a magnitude; NaN stays NaN.
 fn within(torque: f32, limit: f32) -> f32 {
     clamp(torque, -limit, limit)
 }

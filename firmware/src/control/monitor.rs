@@ -16,17 +16,17 @@ pub struct MonitorLimits {
     pub speed_factor: f32,
     /// How far past its range a joint may be: rad, rad, m, rad.
     pub range_margin: Vector4<f32>,
-    /// Samples in a row before a violation counts.
+    /// Consecutive samples before a violation counts.
     pub samples: u32,
-    /// Longest gap in the feedback that the trajectory is continued through, s.
+    /// Longest gap in the feedback across which the trajectory continues, s.
     pub gap: f32,
 }
 
 impl MonitorLimits {
-    /// Limits of the bench. Following error: 0.05 rad is 53 mm at the flange of the stretched arm, which the kinematic laws
-    /// keep (20 mm RMS in the gate) and computed torque uses a hundredth of. Speed: a tenth above what a plan may use. Range:
-    /// the way of a stop from a fifth of the full speed, so that overshoot at a limit does not trip. Three samples: two can be
-    /// noise.
+    /// Limits of the bench. Following error: 0.05 rad is 53 mm at the flange of the stretched arm, which the kinematic
+    /// laws keep (20 mm RMS in the gate); computed torque uses a hundredth of it. Speed: a tenth above what a plan may
+    /// use. Range: the stopping distance from a fifth of full speed, so that overshoot at a limit does not trip. Three
+    /// samples: two can be noise.
     pub const DEFAULT: Self = Self {
         following_error: Vector4::new(
             Parameter::FollowingErrorShoulder.initial(1.0),
@@ -51,11 +51,11 @@ impl MonitorLimits {
     }
 }
 
-/// Watches one arm: its limits, made ready for every sample, and violations in a row.
+/// Monitor of one arm: its limits, prepared for use in every sample, and counts of consecutive violations.
 #[derive(Clone, Copy, Debug)]
 pub struct Monitor {
     following_error: Vector4<f32>,
-    /// Following error that no axis can reach in the time of a gap.
+    /// Following error that no axis can reach within a gap.
     jump: Vector4<f32>,
     speed: Vector4<f32>,
     /// Middle of the joint ranges, and how far from it a joint may be.
@@ -85,7 +85,7 @@ impl Monitor {
         monitor
     }
 
-    /// Takes other limits, and keeps the counts.
+    /// Adopts other limits and keeps the counts.
     pub fn adopt(&mut self, arm: &ArmModel, limits: &MonitorLimits) {
         self.following_error = limits.following_error;
         self.speed = arm.limits.velocity * limits.speed_factor;
@@ -95,7 +95,7 @@ impl Monitor {
         self.needed = limits.samples;
     }
 
-    /// What the drives report about themselves.
+    /// Fault that the drives report.
     pub fn status(status: DriveStatus) -> Option<Fault> {
         let cause = if !status.contains(DriveStatus::ENCODER_VALID) {
             Cause::EncoderFault
@@ -136,7 +136,7 @@ impl Monitor {
         if self.following_count == 0
             && let Some(axis) = first_beyond(error, &self.jump)
         {
-            // In the last sample the axis still followed.
+            // The axis still followed in the last sample.
             return Some(of_axis(Cause::EncoderFault, axis, error, &self.jump));
         }
         let needed = self.needed;
@@ -165,12 +165,12 @@ fn first_beyond(value: &Vector4<f32>, limit: &Vector4<f32>) -> Option<Axis> {
         .into_iter()
         .zip(value.iter())
         .zip(limit.iter())
-        // By their bits, magnitudes compare like integers, and a NaN is beyond every limit.
+        // The bits of magnitudes compare like integers, and NaN is beyond every limit.
         .find(|((_, value), limit)| value.abs().to_bits() > limit.to_bits())
         .map(|((axis, _), _)| axis)
 }
 
-/// Counts violations in a row; the axis once there are as many as are `needed`.
+/// Counts consecutive violations; returns the axis once there are `needed` of them.
 fn count(counter: &mut u32, violation: Option<Axis>, needed: u32) -> Option<Axis> {
     if violation.is_none() {
         *counter = 0;

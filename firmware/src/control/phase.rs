@@ -1,12 +1,12 @@
-//! What a sample spends its time on, for a board that can measure it.
+//! Phases of a sample, for a board that can measure the time of each.
 //!
-//! Marks stand where one phase ends and the next begins, and nowhere else: what measures is the board's. With `()` for
-//! a probe they are no code at all.
+//! The marks are where one phase ends and the next begins; the board does the measuring. With `()` as the probe they
+//! compile to nothing.
 
 listed! {
     /// Part of a call of the node. They follow each other in this order; a call without a sample has the first and the last.
     pub enum Phase {
-        /// Frames taken, checked and understood; requests judged.
+        /// Frames received, checked and decoded; requests judged.
         Decode,
         /// Readings, monitor, mode, and the reference of this sample.
         Reference,
@@ -18,11 +18,11 @@ listed! {
         Law,
         /// Torque limits.
         Limits,
-        /// The command made a frame and handed to the bus.
+        /// The command encoded and handed to the bus.
         Encode,
         /// Steps of planning the next move.
         Planning,
-        /// Watchdogs, replies and what is sent from time to time.
+        /// Watchdogs, replies and periodic messages.
         Report,
     }
 }
@@ -47,7 +47,7 @@ impl Phase {
 
 /// Called at the end of each phase.
 pub trait Probe {
-    /// `phase` has ended; the time since the end before belongs to it.
+    /// `phase` has ended; the time since the previous end belongs to it.
     fn end(&mut self, phase: Phase);
 }
 

@@ -1,4 +1,4 @@
-//! Known answers, checked before anything moves: a wrong build or a broken FPU stays in self-test.
+//! Known answers, checked before anything moves: a wrong build or a broken FPU never leaves self-test.
 
 use core::f32::consts::{FRAC_PI_3, FRAC_PI_4, FRAC_PI_6};
 
@@ -38,7 +38,7 @@ fn sine() -> bool {
     close(sin, 0.5) && close(cos, 0.866_025_4)
 }
 
-/// The pose that q = (30°, 60°, 0.1 m, 45°) has on paper, and back.
+/// The pose of q = (30°, 60°, 0.1 m, 45°), worked out by hand, and back.
 fn kinematics() -> bool {
     let q = Vector4::new(FRAC_PI_6, FRAC_PI_3, 0.1, FRAC_PI_4);
     let pose = kinematics::forward(&IRB_930.geometry, &q);
@@ -50,7 +50,7 @@ fn kinematics() -> bool {
             .is_ok_and(|back| (back - q).amax() <= TOLERANCE)
 }
 
-/// The check values of both CRCs, which their catalogues give for the digits 1 to 9; the first two go in as data id.
+/// The catalogued check values of both CRCs, for the digits 1 to 9; the first two are passed as the data id.
 fn crc() -> bool {
     let id = u16::from_be_bytes(*b"12");
     Profile::Fd.check(id, b"3456789\x29\xB1").is_some()

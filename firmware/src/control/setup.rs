@@ -1,4 +1,4 @@
-//! What can be changed while the controller runs: by requests of the operator, and by parameters.
+//! What can be changed while the controller runs, by requests and by parameters.
 
 use protocol::messages::{Compensation, Law};
 use protocol::parameters::ControllerParameter as Parameter;

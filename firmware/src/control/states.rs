@@ -1,8 +1,8 @@
-//! States of the drive cabinet and every way from one to another.
+//! States of the drive cabinet and every transition between them.
 //!
-//! [`TRANSITIONS`] is the whole machine; `docs/safety.md` has its drawing, made from the table by the test `states`. A state
-//! carries what it needs and says what the drives are to do in it ([`State::control_word`]). Entry actions are the
-//! controller's.
+//! [`TRANSITIONS`] is the whole machine; the test `states` makes the drawing in `docs/safety.md` from it. A state
+//! carries what it needs and determines the control word for the drives ([`State::control_word`]). Entry actions are in
+//! [`controller`](super::controller).
 
 use protocol::messages::{ControlWord, Mode};
 
@@ -11,9 +11,9 @@ use protocol::messages::{ControlWord, Mode};
 pub enum State {
     /// Nothing is known to work yet; left only by passing.
     SelfTest,
-    /// Sound, and waits for the drives.
+    /// Passed the self-test; waiting for the drives.
     PreOperational,
-    /// Would follow an enable.
+    /// Ready to be enabled.
     Ready,
     /// Torque holds the arm while the brake opens; samples left.
     Enabling(u32),
@@ -36,7 +36,7 @@ pub enum State {
 pub enum Halt {
     /// Coming to rest on the path.
     Stopping,
-    /// The brake closes. Until it has, torque carries the lift and goes on stopping the other axes; samples left.
+    /// The brake closes. Until then, torque carries the lift and continues stopping the other axes; samples left.
     Closing(u32),
     /// Torque is off.
     Off,
@@ -79,8 +79,8 @@ listed! {
     }
 }
 
-/// Every transition: from, on, to. What is not here changes nothing. The samples left of a state are 0 here; the controller, on entering it,
-/// puts in the time that the brake takes.
+/// Every transition: from, on, to. An event without a row here changes nothing. The samples left of a state are 0 here;
+/// the controller sets them to the time of the brake on entering it.
 pub const TRANSITIONS: [(State, Event, State); 49] = {
     use Event::{
         Arrived, AtRest, BrakeClosed, BrakeOpen, Disable, EmergencyStop, Enable, FaultBrake,
@@ -146,12 +146,12 @@ pub const TRANSITIONS: [(State, Event, State); 49] = {
     ]
 };
 
-/// Number of states, whatever they carry.
+/// Number of states, not counting what they carry.
 const STATES: usize = 14;
 /// No row of [`TRANSITIONS`].
 const NO_ROW: u8 = u8::MAX;
 
-/// Row of [`TRANSITIONS`] by state and event: found at once, since samples ask.
+/// Row of [`TRANSITIONS`] by state and event: a direct lookup, since every sample uses it.
 #[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 static ROWS: [[u8; Event::ALL.len()]; STATES] = {
     let mut rows = [[NO_ROW; Event::ALL.len()]; STATES];
@@ -167,8 +167,7 @@ static ROWS: [[u8; Event::ALL.len()]; STATES] = {
 };
 
 impl State {
-    /// State after `event`, or `None` if it means nothing in this state; `brake` is the time, in samples, that the brake
-    /// takes.
+    /// State after `event`, or `None` if it means nothing in this state; `brake` is the time of the brake, samples.
     pub fn after(self, event: Event, brake: u32) -> Option<Self> {
         let row = *ROWS.get(self.index())?.get(event as usize)?;
         let (_, _, next) = TRANSITIONS.get(usize::from(row))?;
@@ -204,7 +203,7 @@ impl State {
         }
     }
 
-    /// The state `steps` samples later, and the event that this brings about.
+    /// The state `steps` samples later, and the event raised by the passing of time.
     pub(super) fn wait(self, steps: u32) -> (Self, Option<Event>) {
         let (left, event) = match self {
             Self::Enabling(left) => (left, Event::BrakeOpen),
@@ -217,7 +216,7 @@ impl State {
         (self.with_samples_left(left), (left == 0).then_some(event))
     }
 
-    /// What goes to the drives in this state.
+    /// Control word for the drives in this state.
     pub const fn control_word(self) -> ControlWord {
         let (torque, brake, stop, estop) = (
             ControlWord::TORQUE_ENABLE,
@@ -242,7 +241,7 @@ impl State {
         }
     }
 
-    /// The state as it is reported.
+    /// The mode that is reported for this state.
     pub const fn mode(self) -> Mode {
         match self {
             Self::SelfTest => Mode::SelfTest,
@@ -267,7 +266,7 @@ impl State {
         }
     }
 
-    /// Whether a latched stop is not over yet.
+    /// Whether a latched stop is still in progress.
     pub(super) const fn is_halting(self) -> bool {
         matches!(self.halt(), Some(Halt::Stopping | Halt::Closing(_)))
     }
@@ -277,12 +276,12 @@ impl State {
         self.control_word().contains(ControlWord::TORQUE_ENABLE)
     }
 
-    /// Whether the arm is to come to rest.
+    /// Whether the arm is being stopped.
     pub(super) const fn is_stopping(self) -> bool {
         self.is_halting() || matches!(self, Self::QuickStop)
     }
 
-    /// Whether the brake may hold the lift, beside the torque.
+    /// Whether the brake may hold the lift in addition to the torque.
     pub(super) const fn is_braking(self) -> bool {
         matches!(
             self,

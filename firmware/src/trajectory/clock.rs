@@ -42,7 +42,7 @@ impl Clock {
         self.time_scale <= 0.0
     }
 
-    /// One sample on.
+    /// Advances by one sample.
     pub fn advance(&mut self, period: f32) {
         let step = self.time_scale + 0.5 * self.slope * period;
         self.time_scale = (self.time_scale + self.slope * period).max(0.0);
@@ -53,9 +53,9 @@ impl Clock {
         }
     }
 
-    /// Chooses the next slope of a stop: as steep as no joint passes `braking` (the accelerations
-    /// the plan itself uses) and as its jerk allows, flattening towards rest. The arm stays on
-    /// its path. `reference` is the trajectory's own, before [`Clock::apply`].
+    /// Chooses the next slope of a stop: as steep as `braking` (the joint accelerations that the plan itself uses) and
+    /// the jerk limit allow, flattening towards rest. The arm stays on its path. `reference` is the trajectory's own,
+    /// before [`Clock::apply`].
     pub fn brake(
         &mut self,
         reference: &Reference,
@@ -90,7 +90,7 @@ impl Clock {
         self.slope = -next;
     }
 
-    /// The reference as the braked clock runs through it.
+    /// The reference as traversed by the braked clock.
     pub fn apply(&self, reference: &Reference) -> Reference {
         let (r, slope) = (self.time_scale, self.slope);
         Reference {

@@ -22,15 +22,15 @@ pub struct PathPoint {
 pub enum PathError {
     /// Outside the reach or a joint limit.
     Unreachable(IkError),
-    /// |sin theta2| below [`MIN_SIN_ELBOW`]: a straight line would need unbounded joint speed.
+    /// |sin theta2| below [`MIN_SIN_ELBOW`], where the joint speeds of a straight line grow without bound.
     Singular {
-        /// sin(theta2) found.
+        /// sin(theta2) at that point.
         sin_elbow: f32,
     },
 }
 
-/// A straight line is refused where |sin(theta2)| falls below this: there the joint speeds for a
-/// given tool speed are more than 20 times those at a square elbow.
+/// A straight line is refused where |sin(theta2)| falls below this: the joint speeds for a given tool speed are then
+/// more than 20 times those at a right-angled elbow.
 pub const MIN_SIN_ELBOW: f32 = 0.05;
 
 /// Geometry of a move.
@@ -51,7 +51,7 @@ pub enum Path {
         delta: Vector4<f32>,
         /// Elbow branch, kept along the whole line.
         elbow: Elbow,
-        /// theta4 - (theta1 + theta2 - yaw): the turn of axis 4, kept along the line.
+        /// theta4 - (theta1 + theta2 - yaw): whole turns of axis 4, kept along the line.
         wrist_turns: f32,
     },
 }
@@ -60,7 +60,7 @@ impl Path {
     /// Joint positions and derivatives at `s`.
     ///
     /// # Errors
-    /// Only a line can fail: beyond reach, or too close to the stretched elbow.
+    /// Only for a line: beyond reach, or too close to the stretched elbow.
     pub fn at(&self, arm: &ArmModel, s: f32) -> Result<PathPoint, PathError> {
         match self {
             Self::Joint { start, delta } => Ok(PathPoint {
@@ -102,7 +102,7 @@ impl Path {
 /// First joint limit that `q` violates.
 ///
 /// # Errors
-/// [`IkError::Limit`] with the axis, the value and the limit passed.
+/// [`IkError::Limit`] with the axis, the value and the violated limit.
 pub fn check_limits(arm: &ArmModel, q: &Vector4<f32>) -> Result<(), IkError> {
     let limits = &arm.limits;
     for (((axis, value), lower), upper) in Axis::ALL

@@ -9,12 +9,11 @@
 //!   +----------+----------------------------------------> Refusal (reason, axis, value, limit)
 //! ```
 //!
-//! Constant joint acceleration limits would waste half of the robot: what bounds a SCARA is motor
-//! torque, and inertia changes along the way. The planner therefore scales an S-curve to the
-//! torques of the model. Torque is affine in the path acceleration, so each round corrects the
-//! two accelerations (speeding up, braking) by the worst ratio of torque left to torque needed;
-//! the last pass uses that inverse dynamics is quadratic in the time scale and solves for the
-//! scale at which the worst sample touches its limit (Hollerbach, *Dynamic scaling of manipulator
+//! Constant joint acceleration limits would waste half of the robot: a SCARA is bounded by motor torque, and inertia
+//! changes along the way. The planner therefore scales an S-curve to the torques of the model. Torque is affine in the
+//! path acceleration, so each round corrects the two accelerations (speeding up, braking) by the worst ratio of torque
+//! left to torque needed; in the last pass, inverse dynamics is quadratic in the time scale, and the planner solves for
+//! the scale at which the worst sample touches its limit (Hollerbach, *Dynamic scaling of manipulator
 //! trajectories*, 1984).
 
 mod balance;
@@ -33,13 +32,13 @@ use super::torque_budget::TorqueBudget;
 use crate::mechanics::arm::ArmModel;
 use verify::LINE_STEPS;
 
-/// Points of the survey of a line.
+/// Survey points on a line.
 const SURVEY_POINTS: u8 = 24;
 /// Corrections of the two accelerations.
 const ROUNDS: u8 = 3;
 /// Samples of each half of the profile in one round.
 const BALANCE_POINTS: u8 = 3;
-/// A correction of an acceleration by more than this factor waits for the next round.
+/// Largest factor by which one round reduces an acceleration.
 const STEP: f32 = 1.6;
 /// Moves whose every axis travels less than this (rad or m) end where they begin.
 const NO_TRAVEL: f32 = 1e-6;
@@ -58,7 +57,7 @@ enum Stage {
     Stroke {
         down: bool,
     },
-    /// When that stroke passes the clearance.
+    /// Time at which that stroke passes the clearance.
     Clear {
         down: bool,
     },
@@ -78,7 +77,7 @@ enum Stage {
         /// Time and acceleration of the sample before.
         before: Option<(f32, Vector4<f32>)>,
     },
-    /// All samples are seen.
+    /// All samples have been checked.
     Finish {
         time_scale: f32,
     },
@@ -99,7 +98,7 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// Calls of [`Planner::work`] after which a plan is complete or refused.
+    /// Number of calls of [`Planner::work`] after which a plan is complete or refused.
     pub const MAX_STEPS: u32 = {
         let locate = 1;
         let survey = SURVEY_POINTS as u32 + 1;
@@ -148,14 +147,14 @@ impl Planner {
         matches!(self.stage, Stage::Idle)
     }
 
-    /// Forgets the request at hand and returns its number.
+    /// Drops the current request and returns its number.
     pub fn cancel(&mut self) -> Option<u8> {
         let planning = !self.is_idle();
         self.stage = Stage::Idle;
         planning.then_some(self.draft.sequence)
     }
 
-    /// Number of the request at hand, or of the last one.
+    /// Number of the current request, or of the last one.
     pub fn sequence(&self) -> u8 {
         self.draft.sequence
     }
@@ -169,8 +168,8 @@ impl Planner {
         self.stage = Stage::Locate;
     }
 
-    /// One step of planning: one sample of the move, or one profile. When the plan is complete,
-    /// `Ok` says that [`Planner::trajectory`] is the one asked for, and `Err` why there is none.
+    /// One step of planning: one sample of the move, or one profile. When the plan is complete, `Ok`
+    /// means that [`Planner::trajectory`] holds the requested trajectory, and `Err` why there is none.
     pub fn work(&mut self, budget: &TorqueBudget<'_>) -> Option<Result<(), Refusal>> {
         let step = match self.stage {
             Stage::Idle => return None,
@@ -205,7 +204,7 @@ impl Planner {
         }
     }
 
-    /// What has been planned last.
+    /// The last trajectory planned.
     pub fn trajectory(&self) -> &Trajectory {
         &self.draft
     }
@@ -222,7 +221,7 @@ impl Planner {
         self.draft.lift = None;
         self.draft.time_scale = 1.0;
         self.draft.braking = Vector4::zeros();
-        // Stands for a path on which nothing travels.
+        // For a path along which nothing moves.
         self.draft.profile = SCurve::default();
         self.stage = Stage::Survey {
             point: 0,
@@ -235,7 +234,7 @@ impl Planner {
         self.draft.path.at(arm, s).map_err(from_path)
     }
 
-    /// Profile from the bounds, and how the strokes of a jump lie over it in time.
+    /// Profile from the bounds, and the timing of a jump's strokes relative to it.
     fn compose(&mut self, round: u8) {
         let travels = self.bounds.speed > 0.0;
         if travels {
@@ -271,8 +270,8 @@ impl Default for Planner {
     }
 }
 
-/// The speed along the path at which the first joint reaches its limit, with the joints' travels per unit of path; huge
-/// where nothing travels.
+/// The speed along the path at which the first joint reaches its limit, given the joints' travel per unit of path; huge
+/// where nothing moves.
 fn fill(limit: &Vector4<f32>, travel: &Vector4<f32>) -> f32 {
     limit
         .iter()

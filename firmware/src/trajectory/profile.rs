@@ -2,7 +2,7 @@
 //!
 //! Seven segments at most (Biagiotti & Melchiorri, *Trajectory Planning for Automatic Machines
 //! and Robots*, 2008, section 3.4), with different accelerations for speeding up and for braking:
-//! friction helps to brake, gravity helps a lift to fall, and inertia changes along the way.
+//! friction assists braking, gravity assists a descending lift, and inertia changes along the way.
 //!
 //! ```text
 //!  accel   ____                      one half: jerk +j, constant a, jerk -j
@@ -53,7 +53,7 @@ struct Half {
 
 impl Half {
     fn new(speed: f32, acceleration: f32, jerk: f32) -> Self {
-        // Where the speed is reached before the acceleration is, the peak acceleration is lower.
+        // If the speed is reached before the acceleration limit, the peak acceleration is lower.
         let acceleration = if speed * jerk < acceleration * acceleration {
             sqrt(speed * jerk)
         } else {
@@ -92,8 +92,8 @@ impl Half {
         2.0 * self.ramp + self.hold
     }
 
-    /// First border of two segments later than `t`, infinite from the end on. The ramps are of one length: it does not
-    /// matter from which end time runs.
+    /// First segment border after `t`; infinite from the end on. Both ramps have the same length, so time may run from
+    /// either end.
     fn border_after(&self, t: f32) -> f32 {
         let held = self.ramp + self.hold;
         if t < self.ramp {
@@ -122,7 +122,7 @@ impl Half {
             let a = self.acceleration;
             let u = t - 0.5 * self.ramp;
             Sample {
-                // The ramp's own area stands in for a shift of half its length.
+                // The ramp counts as a shift by half its length.
                 s: 0.5 * a * u * u + a * self.ramp * self.ramp / 24.0,
                 v: a * u,
                 a,
@@ -151,8 +151,8 @@ pub struct SCurve {
 }
 
 /// Newton steps for the peak speed. The start lies left of the root of a convex increasing
-/// function, so the first step lands right of it and the others fall monotonically; six leave
-/// less than one part in 10^6 for any ratio of the bounds that a robot has (tested).
+/// function, so the first step lands right of it and the others decrease monotonically; after six the error is below
+/// one part in 10^6 for any ratio of bounds that a robot has (tested).
 const NEWTON_STEPS: usize = 6;
 
 impl SCurve {
@@ -166,8 +166,8 @@ impl SCurve {
             brake,
             jerk,
         } = *bounds;
-        // With jerk alone the peak speed would be this; no acceleration above the one that goes
-        // with it is ever reached, and without it the quadratic below is a poor start.
+        // The peak speed with jerk alone. No acceleration above the one at this speed is ever reached; without that cap
+        // the quadratic below is a poor start.
         let unlimited = cbrt(0.25 * distance * distance * jerk);
         let reachable = sqrt(unlimited * jerk);
         let accelerate = accelerate.min(reachable);
@@ -214,8 +214,8 @@ impl SCurve {
         self.accelerate.duration() + self.cruise
     }
 
-    /// First border of two segments later than `t`, s; infinite from the end on. At a border the motion is smooth, but
-    /// bends: what is greatest along a move is often greatest there.
+    /// First segment border after `t`, s; infinite from the end on. Jerk changes at a border, so the extrema of a move
+    /// are often there.
     pub fn border_after(&self, t: f32) -> f32 {
         let (cruise, brake) = (self.accelerate_end(), self.brake_start());
         if t < 0.0 {
@@ -229,7 +229,7 @@ impl SCurve {
         }
     }
 
-    /// Motion at `t`; before the start and after the end the coordinate rests at its ends.
+    /// Motion at `t`; at rest at the start before it, and at the end after it.
     pub fn at(&self, t: f32) -> Sample {
         let speeding = self.accelerate.duration();
         let braking = speeding + self.cruise;
@@ -285,7 +285,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The three derivatives, integrated in f64, give the distance back; no bound is passed.
+        /// The three derivatives, integrated in f64, reproduce the distance; no bound is exceeded.
         #[test]
         fn integrates_to_the_distance_within_bounds(
             distance in 0.01f32..6.0,
@@ -334,7 +334,7 @@ mod tests {
         }
     }
 
-    /// Between two borders the jerk is one constant; at each it changes. All eight are found, and no other.
+    /// The jerk is constant between borders and changes at each. All eight are found, and no other.
     #[test]
     fn borders_are_where_the_jerk_changes() {
         let bounds = Bounds {

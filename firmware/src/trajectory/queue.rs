@@ -1,4 +1,4 @@
-//! Requests on their way to becoming motion: waiting, being planned, planned, under way.
+//! Queue of moves: waiting, being planned, planned, under way.
 
 use heapless::Deque;
 use nalgebra::Vector4;
@@ -11,19 +11,19 @@ use super::torque_budget::TorqueBudget;
 use super::{Reference, Trajectory};
 use crate::mechanics::arm::ArmModel;
 
-/// Requests that may wait, and planned moves that may wait.
+/// Capacity for requests, and as many planned moves.
 pub const CAPACITY: usize = 4;
 
-/// What [`MoveQueue::advance`] came to.
+/// Result of [`MoveQueue::advance`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// There is more to come.
+    /// The motion continues.
     UnderWay,
-    /// At rest: the last move has ended, or the stop.
+    /// At rest: the last move or the stop has ended.
     Arrived,
 }
 
-/// All motion that an operator has asked for and that has not ended.
+/// All requested motion that has not ended.
 #[derive(Clone, Debug)]
 pub struct MoveQueue {
     requests: Deque<Request, CAPACITY>,
@@ -37,7 +37,7 @@ pub struct MoveQueue {
 }
 
 impl MoveQueue {
-    /// Nothing asked for.
+    /// An empty queue.
     pub fn new() -> Self {
         Self {
             requests: Deque::new(),
@@ -49,7 +49,7 @@ impl MoveQueue {
         }
     }
 
-    /// Moves that have not ended, in whatever stage.
+    /// Number of moves that have not ended, in any stage.
     pub fn len(&self) -> u8 {
         // At most two queues and one in the planner: far below 255.
         (self.moves.len() + self.requests.len()) as u8 + u8::from(self.is_planning())
@@ -65,7 +65,7 @@ impl MoveQueue {
         !self.planner.is_idle()
     }
 
-    /// Whether a planned move is there to begin or go on.
+    /// Whether there is a planned move to begin or continue.
     pub fn is_ready(&self) -> bool {
         !self.moves.is_empty()
     }
@@ -85,27 +85,26 @@ impl MoveQueue {
             .map_err(|_| Refusal::because(RefusalReason::QueueFull))
     }
 
-    /// Takes back one request that has not been answered, and returns its number; `None` when
-    /// there is none left.
+    /// Withdraws one unanswered request and returns its number; `None` when there is none left.
     pub fn withdraw(&mut self) -> Option<u8> {
         self.planner
             .cancel()
             .or_else(|| self.requests.pop_front().map(|request| request.sequence))
     }
 
-    /// Forgets all planned moves; the next one starts at `q`.
+    /// Drops all planned moves; the next one starts at `q`.
     pub fn clear(&mut self, q: &Vector4<f32>) {
         self.moves.clear();
         self.clock = Clock::default();
         self.plan_end = *q;
     }
 
-    /// Whether there is a move to plan, and room for it.
+    /// Whether there is a move to plan and room for it.
     pub fn has_to_plan(&self) -> bool {
         self.is_planning() || !(self.requests.is_empty() || self.moves.is_full())
     }
 
-    /// One step of planning. Returns the number of a request and its answer, when it has one.
+    /// One step of planning. Returns the number of a request and its answer once there is one.
     pub fn plan(&mut self, budget: &TorqueBudget<'_>) -> Option<(u8, Result<(), Refusal>)> {
         if self.planner.is_idle() {
             if self.moves.is_full() {
@@ -122,14 +121,14 @@ impl MoveQueue {
             planned.map(|()| {
                 let trajectory = self.planner.trajectory();
                 self.plan_end = trajectory.end;
-                // There was room when the planner took the request.
+                // Room was checked when the planner took the request.
                 let _ = self.moves.push_back(*trajectory);
             }),
         ))
     }
 
-    /// The reference `steps` samples of `period` seconds on; while `stopping`, braking on the
-    /// path. Without a move the arm stays at `here`.
+    /// The reference after `steps` more samples of `period` seconds, braking on the path while `stopping`. Without a
+    /// move the arm stays at `here`.
     pub fn advance(
         &mut self,
         arm: &ArmModel,
@@ -146,7 +145,7 @@ impl MoveQueue {
         }
         let t = self.clock.time(period);
         let ended = t >= trajectory.duration();
-        // A verified path stays in reach; should arithmetic disagree, the arm holds.
+        // A verified path stays in reach; should rounding disagree, the arm holds its position.
         let planned = trajectory
             .at(arm, t)
             .unwrap_or_else(|_| Reference::rest(*here));

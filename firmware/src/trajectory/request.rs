@@ -1,4 +1,4 @@
-//! What an operator asks for, and the path that it means.
+//! A requested move, and its path.
 
 use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
@@ -21,7 +21,7 @@ pub enum Target {
         pose: Pose,
         /// Height of the tool at the top.
         top: f32,
-        /// Height that is strictly vertical at both ends; above it the corners are blended.
+        /// Height of the strictly vertical part at both ends; above it the corners are blended.
         clearance: f32,
     },
 }
@@ -29,7 +29,7 @@ pub enum Target {
 /// A move to plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
-    /// Number by which the operator knows the move.
+    /// Sequence number that the operator gave the move.
     pub sequence: u8,
     /// Where to.
     pub target: Target,
@@ -44,7 +44,7 @@ pub(super) struct Gate {
     pub(super) rise: f32,
     /// From the top to the end.
     pub(super) fall: f32,
-    /// Strictly vertical at both ends.
+    /// Of the strictly vertical part at both ends.
     pub(super) clearance: f32,
 }
 
@@ -133,7 +133,7 @@ fn gate(
     })
 }
 
-/// The refusal that tells an operator what inverse kinematics found.
+/// The refusal for an error of inverse kinematics.
 pub(super) fn from_ik(error: IkError) -> Refusal {
     match error {
         IkError::NotFinite => Refusal::because(RefusalReason::NotFinite),
@@ -148,7 +148,7 @@ pub(super) fn from_ik(error: IkError) -> Refusal {
     }
 }
 
-/// The refusal that tells an operator why a point of a path cannot be reached.
+/// The refusal for an unreachable point of a path.
 pub(super) fn from_path(error: PathError) -> Refusal {
     match error {
         PathError::Unreachable(error) => from_ik(error),

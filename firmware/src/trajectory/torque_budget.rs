@@ -1,4 +1,4 @@
-//! What the drives can do: the room that a motion leaves to torque, speed and jerk limits.
+//! Torque budget: the margin between a motion and the torque, speed and jerk limits.
 
 use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
@@ -11,8 +11,8 @@ use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::{cbrt, clamp, sqrt};
 
-/// Share of the torque that a plan may use. The rest is for the feedback: payload and friction
-/// are never known exactly, and a saturated axis leaves the path.
+/// Share of the torque that a plan may use. The rest is for feedback control: payload and friction are never known
+/// exactly, and a saturated axis leaves the path.
 pub const TORQUE_SHARE: f32 = 0.93;
 
 /// The limits of one arm with one payload, as the planner uses them.
@@ -20,13 +20,13 @@ pub const TORQUE_SHARE: f32 = 0.93;
 pub struct TorqueBudget<'a> {
     /// The robot.
     pub arm: &'a ArmModel,
-    /// Its dynamics with the payload that it will carry.
+    /// Its dynamics with the payload of the move.
     pub body: &'a Body,
 }
 
 impl TorqueBudget<'_> {
-    /// By what factor the path acceleration of `along` could grow before the first joint torque
-    /// reaches its share; huge where the sample needs hardly any.
+    /// Factor by which the path acceleration of `along` could grow before the first joint torque reaches its share;
+    /// huge where the sample needs hardly any torque.
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
         let Self { arm, body } = self;
         let trig = Trig::in_line(&here.q);
@@ -52,10 +52,10 @@ impl TorqueBudget<'_> {
         room
     }
 
-    /// Whether the arm can creep: carry its weight against friction in either direction, with torque to spare.
+    /// Whether the arm can creep: hold its weight and overcome friction in either direction with torque to spare.
     ///
     /// # Errors
-    /// [`RefusalReason::TorqueTooSmall`] with the axis and torque that no time scale makes less.
+    /// [`RefusalReason::TorqueTooSmall`] with the axis and the torque, which no time scale reduces.
     pub fn check_creep(&self) -> Result<(), Refusal> {
         let torque = self.body.lagrange.gravity().abs() + self.arm.drive.coulomb;
         let (joint, motor) = self.torque_limits();
@@ -87,13 +87,13 @@ impl TorqueBudget<'_> {
         let Self { arm, body } = self;
         let trig = Trig::in_line(&reference.q);
         let (qd, qdd) = (&reference.qd, &reference.qdd);
-        // tau(x) = a x² + b x + c. Coulomb friction does not fade with x.
+        // tau(x) = a x² + b x + c. Coulomb friction does not depend on x.
         let a = body.inertial(&trig, qdd) + body.lagrange.bias(&trig, qd);
         let b = arm.drive.viscous.component_mul(qd);
         let c = body.lagrange.gravity() + body.drive.coulomb_friction(qd);
         let full = a + b + c;
         let (joint, motor) = self.torque_limits();
-        // Nearly every sample keeps its limits as it is: then there is nothing to solve.
+        // Nearly every sample is within its limits unscaled: nothing to solve.
         if within(&full, &joint) && self.wrist_motor(&full).abs() <= motor {
             return 1.0;
         }
@@ -105,8 +105,8 @@ impl TorqueBudget<'_> {
             .min(scale_within(wrist(&a), wrist(&b), wrist(&c), motor))
     }
 
-    /// Torques that a plan may use: of the joints, as they and the motors that turn one joint each allow, and of the motor of
-    /// the wrist, which carries part of the lift's force, too.
+    /// Torques that a plan may use: of the joints, limited by themselves and by the motors that turn one joint each,
+    /// and of the wrist motor, which also carries part of the lift's force.
     fn torque_limits(&self) -> (Vector4<f32>, f32) {
         let motor = self.arm.drive.motor_torque_limit * TORQUE_SHARE;
         let mut own = self.body.drive.own_torque(&motor).abs();
@@ -157,8 +157,8 @@ impl TorqueBudget<'_> {
         self.arm.limits.velocity.inf(&motor)
     }
 
-    /// Bounds of the vertical strokes of a jump, up and down, over at most `height` m. Gravity
-    /// and friction are taken from the force; friction is never counted as help.
+    /// Bounds of the vertical strokes of a jump, up and down, over at most `height` m. Gravity and friction are
+    /// subtracted from the available force; friction never adds to it.
     pub fn lift(&self, height: f32) -> (Bounds, Bounds) {
         let limits = &self.arm.limits;
         let mass = self.body.mass_matrix(&Trig::new(&Vector4::zeros())).m33;
@@ -168,7 +168,8 @@ impl TorqueBudget<'_> {
         let peak = sqrt(cap * height).min(speed);
         let friction = self.arm.drive.coulomb.z + self.arm.drive.viscous.z * peak;
         let force = self.torque().z;
-        // A stroke that the drive cannot hold has been refused: this keeps the bound positive for one close to the limit.
+        // Strokes that the drive cannot hold have been refused: this keeps the bound positive for one close to the
+        // limit.
         let within = |force: f32| clamp(force / mass, 0.01 * cap, cap);
         let up = Bounds {
             speed,
@@ -197,7 +198,7 @@ fn within(value: &Vector4<f32>, limit: &Vector4<f32>) -> bool {
         .all(|(value, limit)| value.abs() <= *limit)
 }
 
-/// Least of limit over value, where a value is larger than its limit; else at least 1.
+/// Smallest ratio of limit to value where a value exceeds its limit; otherwise at least 1.
 fn ratio(limit: &Vector4<f32>, value: &Vector4<f32>) -> f32 {
     let mut least = 1.0f32;
     for (limit, value) in limit.iter().zip(value.iter()) {

@@ -1,4 +1,4 @@
-//! Where the moves are: planned on, followed, stopped, taken back.
+//! Moves in the controller: planning, following, stopping and withdrawing them.
 
 use protocol::messages::{Outcome, Refusal, RefusalReason};
 
@@ -9,7 +9,7 @@ use crate::trajectory::queue::Progress;
 use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Controller {
-    /// Refuses what waits to be planned; planned moves go when the arm has come to rest.
+    /// Refuses moves waiting to be planned; planned moves are dropped once the arm is at rest.
     pub(super) fn withdraw(&mut self) {
         while let Some(sequence) = self.queue.withdraw() {
             self.reply(
@@ -19,9 +19,8 @@ impl Controller {
         }
     }
 
-    /// Plans on, for the time until the next sample: a step for every millisecond of the sampling
-    /// period, at least one. Off the way from measurement to command, which it would only make
-    /// late. Returns whether there was anything to plan.
+    /// Continues planning: one step per millisecond of the sampling period, at least one. Kept out of the path from
+    /// measurement to command, which it would delay. Returns whether there was anything to plan.
     pub fn plan(&mut self) -> bool {
         if !self.state.is_powered() || !self.queue.has_to_plan() {
             return false;

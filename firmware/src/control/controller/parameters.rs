@@ -1,4 +1,4 @@
-//! The controller's parameters: where each is kept, and what follows when it changes.
+//! The controller's parameters: where each is stored, and what a change entails.
 
 use protocol::parameters::{ControllerParameter as Parameter, Field, Store};
 

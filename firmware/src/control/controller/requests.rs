@@ -1,4 +1,4 @@
-//! What an operator may ask for in which state.
+//! Which requests an operator may make in which state.
 
 use nalgebra::Vector4;
 use protocol::messages::{Compensation, MotionRequest, Refusal, RefusalReason};
@@ -36,7 +36,7 @@ impl Controller {
             MotionRequest::Stop => {
                 self.withdraw();
                 if self.state == State::Enabled {
-                    // Planned, not begun: there is nothing to brake.
+                    // Planned but not started: there is nothing to brake.
                     self.queue.clear(&self.reference.q);
                 }
                 self.event(Event::Stop);
@@ -107,14 +107,14 @@ impl Controller {
         Ok(answer)
     }
 
-    /// What the law remembers belongs to the gains and the model it was gathered with.
-    // Out of line, as the next: each is asked for in several places, none of them in a sample.
+    /// Resets the law's memory, which is valid only for the gains and the model it was gathered with.
+    // Out of line, like the next: each has several callers, none of them in a sample.
     #[inline(never)]
     pub(super) fn forget(&mut self) {
         self.memory = Memory::new();
     }
 
-    /// Nothing moves or is about to, and nothing is wrong: what torques come from may change.
+    /// Whether law, gains and model may change: nothing moves or is about to, and no fault is latched.
     #[inline(never)]
     pub(super) fn is_idle(&self) -> bool {
         matches!(self.state, State::Ready | State::PreOperational)
@@ -147,7 +147,7 @@ impl Controller {
     }
 }
 
-/// What an operator reads of a payload that breaks a rule.
+/// The refusal of a payload that breaks a rule.
 fn payload_refusal(error: ModelError) -> Refusal {
     let (reason, limit) = match error.rule {
         Rule::AtMost(limit) => (RefusalReason::PayloadTooHeavy, limit),

@@ -1,4 +1,4 @@
-//! Entry actions of the states, and what leads from one to the next.
+//! Entry actions of the states, and the events that change them.
 
 use nalgebra::Vector4;
 use protocol::messages::{Cause, ControlWord, DriveStatus, Fault, LimitFlags};
@@ -10,7 +10,7 @@ use crate::control::monitor::Monitor;
 use crate::control::states::{Event, Halt, State};
 
 impl Controller {
-    /// Takes the transition that the state has for `event`; returns whether there is one.
+    /// Takes the transition of the current state on `event`; returns whether there is one.
     pub fn event(&mut self, event: Event) -> bool {
         let brake = (self.setup.brake_delay / self.config.period.seconds()) as u32 + 1;
         let Some(next) = self.state.after(event, brake) else {
@@ -20,15 +20,15 @@ impl Controller {
         true
     }
 
-    /// Something is wrong: does what the table of faults has for it. The first fault is kept until a reset; every one that
-    /// changes the state is reported.
+    /// Reacts to a fault according to the fault table. The first fault is kept until a reset; every fault that changes
+    /// the state is reported.
     // Out of line: rarely reached in a sample.
     #[inline(never)]
     pub fn fail(&mut self, fault: Fault) {
         let before = self.fault;
         let first = before.cause == Cause::None;
         if first {
-            // Ahead of the transition, which may lead where no fault is latched.
+            // Before the transition, which may lead to a state without a latched fault.
             self.fault = fault;
         }
         let changed = fault::event(fault.cause, self.state).is_some_and(|event| self.event(event));
@@ -47,7 +47,7 @@ impl Controller {
             }
             State::Fault(halt) | State::EStop(halt) => {
                 self.withdraw();
-                // What is wrong has to show again before it leads further.
+                // A violation has to recur before it escalates.
                 self.monitor.reset();
                 if halt == Halt::Off {
                     self.queue.clear(&self.reference.q);
@@ -59,7 +59,7 @@ impl Controller {
         self.state = next;
     }
 
-    /// A gap in the feedback: bridged if it is short.
+    /// Bridges a gap in the feedback if it is short.
     pub(super) fn bridge(&mut self, steps: u32) {
         if steps > self.max_gap {
             let gap = steps as f32 * self.config.period.seconds() * 1e3;
@@ -70,7 +70,7 @@ impl Controller {
         }
     }
 
-    /// Watches the arm for as long as torque moves or holds it, a stop for a fault included.
+    /// Watches the arm as long as torque moves or holds it, including a stop for a fault.
     pub(super) fn watch(&mut self, status: DriveStatus, q: &Vector4<f32>, qd: &Vector4<f32>) {
         if !self.state.is_powered() {
             return;
@@ -86,7 +86,7 @@ impl Controller {
         }
     }
 
-    /// Time passes for the brake.
+    /// Counts down the time of the brake.
     pub(super) fn wait(&mut self, steps: u32) {
         let (state, event) = self.state.wait(steps);
         self.state = state;
@@ -95,8 +95,8 @@ impl Controller {
         }
     }
 
-    /// What drives and pins are to do now: unlike the command sent last, it also follows what
-    /// happens between two samples.
+    /// The control word for drives and pins now: unlike the last command sent, it includes what has happened since that
+    /// sample.
     pub fn control_word(&self) -> ControlWord {
         self.state.control_word()
     }

@@ -1,8 +1,8 @@
 //! Computed torque in joint space: tau = M(q)(qdd_d + Kd e' + Kp e) + C qd + g + friction.
 //!
-//! The tracking form of the paper's dynamic control in joint space, whose M and n are listed
-//! there and not used. Feed-forward is taken where the command will act, not where the
-//! measurement was: half a hold and the way over the bus later.
+//! The tracking form of the paper's dynamic control in joint space, whose M and n the paper lists
+//! and does not use. Feed-forward is evaluated for when the command will act, not when the measurement was taken: half
+//! a hold and the bus delay later.
 
 use nalgebra::Vector4;
 use protocol::messages::Compensation;
@@ -27,8 +27,8 @@ pub fn torque(
     realise(input, &acceleration, gains, compensation, memory)
 }
 
-/// The torques that give the joints `acceleration` in spite of what the model says acts on them
-/// and, with the observer, of what it does not say.
+/// The torques that give the joints `acceleration` against the modelled forces and, with the observer, the unmodelled
+/// ones.
 pub(super) fn realise(
     input: &ControlInput<'_>,
     acceleration: &Vector4<f32>,

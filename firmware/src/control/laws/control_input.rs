@@ -1,7 +1,7 @@
-//! What a law sees in one sample: the motion, and what kinematics and dynamics make of it.
+//! Input of a law in one sample: the motion, and the kinematics and dynamics evaluated for it.
 //!
-//! Both are worked out before the law is asked, whichever law that is. So a law is a few lines of algebra, and a sample
-//! takes as long with one as with another.
+//! All of it is computed before the law is called, whichever law that is. So a law is a few lines of algebra, and a
+//! sample takes about as long with any law.
 
 use nalgebra::Vector4;
 
@@ -15,7 +15,7 @@ use crate::trajectory::Reference;
 /// Everything that a law may use.
 #[derive(Clone, Copy, Debug)]
 pub struct ControlInput<'a> {
-    /// Motion in joint space, measured and wanted.
+    /// Motion in joint space, measured and desired.
     pub motion: &'a Motion<'a>,
     /// The same in task space.
     pub task: &'a Task,
@@ -33,15 +33,15 @@ pub struct Motion<'a> {
     pub q: Vector4<f32>,
     /// Measured joint velocities: means over the last sample, so half a sample old.
     pub qd: Vector4<f32>,
-    /// Measured efforts, means over the last sample: what the motors gave, at the joints, friction included.
+    /// Measured efforts at the joints, means over the last sample: what the motors gave, friction included.
     pub torque: Vector4<f32>,
     /// Reference at the sampling instant.
     pub reference: &'a Reference,
-    /// Reference velocity through the same filter as `qd`: compared with it without a delay.
+    /// Reference velocity through the same filter as `qd`, so that the two compare without a delay.
     pub mean_qd: Vector4<f32>,
     /// Reference velocity at the middle of the time in which the command will act.
     pub qd_ahead: Vector4<f32>,
-    /// Reference acceleration then.
+    /// Reference acceleration at the same instant.
     pub qd_aheadd: Vector4<f32>,
     /// Sampling period, s.
     pub period: f32,
@@ -55,7 +55,7 @@ impl Motion<'_> {
         self.reference.q - self.q
     }
 
-    /// Measured velocity, brought forward by what the reference gains in the meantime.
+    /// Measured velocity, extrapolated by the change of the reference in the meantime.
     pub fn measured_qd_ahead(&self) -> Vector4<f32> {
         self.qd + (self.qd_ahead - self.mean_qd)
     }
@@ -80,12 +80,12 @@ pub struct Task {
 }
 
 impl Task {
-    /// Task space of an arm of this geometry whose measured position is that of `trig`.
+    /// Task space of an arm of this geometry at the measured position of `trig`.
     pub fn new(geometry: &Geometry, trig: &Trig, motion: &Motion<'_>) -> Self {
         let desired = Jacobian::new(geometry, &Trig::in_line(&motion.reference.q));
         let actual = Jacobian::new(geometry, trig);
         let ((x_desired, y_desired), (x, y)) = (desired.position(), actual.position());
-        // Height and yaw are linear in the joints: so are their errors.
+        // Height and yaw are linear in the joints, and so are their errors.
         let joint = motion.position_error();
         Self {
             position: Vector4::new(
@@ -106,13 +106,13 @@ impl Task {
 pub struct Model {
     /// M, rotors included.
     pub mass: MassMatrix,
-    /// C qd at the velocity of the time in which the command will act.
+    /// C qd at the reference velocity while the command will act.
     pub bias: Vector4<f32>,
     /// g.
     pub gravity: Vector4<f32>,
-    /// Friction of the planned motion: that of the measured one would chatter around rest.
+    /// Friction at the planned velocity: at the measured one it would chatter around rest.
     pub friction: Vector4<f32>,
-    /// C^T qd at the measured velocity: what the momentum gains besides the torques.
+    /// C^T qd at the measured velocity: the rate of the momentum that no torque causes.
     pub kinetic_gradient: Vector4<f32>,
 }
 

@@ -3,8 +3,8 @@
 //! With p = M qd and M' = C + C^T, p' = tau + d + C^T qd - g - friction for the unknown torque d;
 //! C^T qd is the gradient of the kinetic energy with respect to q.
 //! The residual r = K (p - integral of all known terms and r) follows d as a first-order low-pass
-//! with corner K. It needs no acceleration and, since it counts the torque that the drives report
-//! and not the one that was asked for, it does not wind up when an axis saturates.
+//! with corner K. It needs no acceleration and does not wind up when an axis saturates, since it uses the torque that
+//! the drives report instead of the commanded one.
 
 use nalgebra::Vector4;
 
@@ -33,8 +33,8 @@ impl MomentumObserver {
 
     /// Estimated disturbance at the joints after one more sample, positive along +q.
     ///
-    /// The corner is bounded to half a radian a sample, where the discrete filter still behaves
-    /// like the continuous one.
+    /// The corner is bounded to half a radian per sample, where the discrete filter still behaves like the continuous
+    /// one.
     pub fn update(&mut self, motion: &Motion<'_>, model: &Model, corner: f32) -> Vector4<f32> {
         let period = motion.period;
         let momentum = &model.mass * &motion.qd;
@@ -44,8 +44,8 @@ impl MomentumObserver {
             self.previous_torque = motion.torque;
             return self.residual;
         }
-        // Velocities are means over a sample and stand for its middle: between two of them act
-        // the second half of one torque sample and the first half of the next.
+        // Velocities are means over a sample and so belong to its middle: between two of them, the
+        // second half of one torque sample and the first half of the next act.
         let torque = 0.5 * (motion.torque + self.previous_torque);
         self.previous_torque = motion.torque;
         let known = model.gravity + model.friction;

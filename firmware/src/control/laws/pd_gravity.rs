@@ -1,8 +1,7 @@
 //! PD with gravity compensation: tau = Kp (q_d - q) + Kd (qd_d - qd) + g(q).
 //!
-//! The paper's dynamic control in joint space. Right for set points (Takegaki & Arimoto, 1981);
-//! while tracking it lags by the torque that the motion needs, which [`super::computed_torque`]
-//! adds.
+//! The paper's dynamic control in joint space. Stable at set points (Takegaki & Arimoto, 1981); while tracking, it lags
+//! for want of the torque that the motion needs, which [`super::computed_torque`] adds.
 
 use nalgebra::Vector4;
 

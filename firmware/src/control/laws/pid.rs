@@ -1,4 +1,4 @@
-//! PID, one axis by itself. The paper names it and gives no law; this is the textbook form
+//! PID, each axis by itself. The paper names it and gives no law; this is the textbook form
 //! (Siciliano et al., *Robotics*, 2009, section 8.3) with clamping anti-windup.
 
 use nalgebra::Vector4;

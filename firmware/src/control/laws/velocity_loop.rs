@@ -1,4 +1,4 @@
-//! The inner loop that kinematic control takes for granted: joint velocity by PI, weight carried.
+//! The inner loop that kinematic control takes for granted: PI control of joint velocity with gravity compensation.
 
 use nalgebra::Vector4;
 
@@ -6,7 +6,7 @@ use super::{ControlInput, Gains, Memory};
 
 /// Joint torques that make the joints follow the velocities `command` (means over a sample).
 ///
-/// The proportional gain is that of the derivative part of the other laws; the integral time is
+/// The proportional gain is the derivative gain of the other laws; the integral time is
 /// four time constants of the loop, the usual compromise of overshoot and stiffness.
 pub(super) fn torque(
     command: &Vector4<f32>,

@@ -1,4 +1,4 @@
-//! Rounds that let both accelerations of the profile fill the torque limits.
+//! Rounds that raise or lower both accelerations of the profile until they use the torque limits fully.
 
 use protocol::messages::Refusal;
 
@@ -50,11 +50,11 @@ impl Planner {
         Ok(())
     }
 
-    /// The joint accelerations' own limits, as a limit along the path.
+    /// The joint acceleration limits as a limit along the path.
     fn acceleration_ceiling(&self, arm: &ArmModel) -> f32 {
         match &self.draft.path {
             Path::Joint { delta, .. } => fill(&arm.limits.acceleration, delta),
-            // Varies along a line; the last pass sees to it.
+            // Varies along a line: left to the last pass.
             Path::Line { .. } => f32::MAX,
         }
     }

@@ -1,4 +1,4 @@
-//! The vertical parts of a jump, and when each passes the clearance.
+//! The vertical strokes of a jump, and the time at which each passes the clearance.
 
 use super::{NO_TRAVEL, Planner, Stage};
 use crate::trajectory::Lift;
@@ -28,7 +28,7 @@ impl Planner {
         self.stage = Stage::Clear { down };
     }
 
-    /// When one stroke passes the clearance.
+    /// The time at which one stroke passes the clearance.
     pub(super) fn clear(&mut self, down: bool) {
         self.stage = Stage::Compose { round: 0 };
         let (Some(gate), Some(lift)) = (self.gate, &self.draft.lift) else {
@@ -43,7 +43,7 @@ impl Planner {
     }
 }
 
-/// A profile over a length that may be nothing.
+/// A profile over a length that may be zero.
 fn stroke(length: f32, bounds: &Bounds) -> SCurve {
     if length > NO_TRAVEL {
         SCurve::new(length, bounds)

@@ -1,4 +1,4 @@
-//! Along the path before anything is timed: reach, limits, and how far each joint travels.
+//! Survey of the path before any timing: reach, limits, and how far each joint travels.
 
 use nalgebra::Vector4;
 use protocol::messages::Refusal;
@@ -10,15 +10,15 @@ use crate::trajectory::request::from_ik;
 use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Planner {
-    /// Reach, limits and the largest joint travel per unit of path; at the ends also the accelerations
-    /// from rest that torque allows, a start for the rounds.
+    /// Reach, limits and the largest joint travel per unit of path; at the ends also the accelerations from
+    /// rest that torque allows, as initial values of the rounds.
     pub(super) fn survey(
         &mut self,
         budget: &TorqueBudget<'_>,
         point: u8,
         fastest: Vector4<f32>,
     ) -> Result<(), Refusal> {
-        // A path straight in joint space lies between its ends.
+        // A straight path in joint space stays between its ends.
         let points = match self.draft.path {
             Path::Joint { .. } => 1,
             Path::Line { .. } => SURVEY_POINTS,
@@ -43,7 +43,7 @@ impl Planner {
         self.bounds.jerk = fill(&limits.jerk, &fastest);
         self.bounds.speed = fill(&budget.speed(), &fastest);
         if self.bounds.speed == f32::MAX {
-            // Nothing travels along the path: at most the lift of a jump moves.
+            // Nothing moves along the path: at most the lift of a jump does.
             self.bounds.speed = 0.0;
         }
         self.stage = if self.gate.is_some() {

@@ -9,8 +9,7 @@ use crate::trajectory::path::Path;
 use crate::trajectory::request::from_path;
 use crate::trajectory::torque_budget::TorqueBudget;
 
-/// Steps of the last pass, at the most, between the borders of segments; along a line more, since there the joints have
-/// extremes of their own.
+/// Most steps of the last pass between segment borders; more along a line, where the joints have extrema of their own.
 const JOINT_STEPS: u8 = 20;
 pub(super) const LINE_STEPS: u8 = 40;
 /// Share of the limits of speed, acceleration and jerk that the samples of a line may use.
@@ -28,15 +27,13 @@ impl Planner {
         let mut reference = self.draft.at(budget.arm, t).map_err(from_path)?;
         let mut time_scale = time_scale.min(budget.torque_scale(&reference));
         if matches!(self.draft.path, Path::Line { .. }) {
-            // The joint accelerations bend between the samples, and the jerk has a part that only
-            // their difference shows.
+            // The joint accelerations vary between the samples: part of the jerk shows only in their difference.
             if let Some((earlier, qdd)) = before {
                 reference.qddd = (reference.qdd - qdd) / (t - earlier);
             }
             time_scale = time_scale.min(budget.derivative_scale(&reference, LINE_SHARE));
         } else {
-            // Each joint keeps its own limits by how its profile was made. Lift and wrist share a
-            // motor.
+            // The profile keeps each joint within its own limits; but lift and wrist share a motor.
             time_scale = time_scale.min(budget.lift_motor_scale(&reference.qd));
         }
         self.draft.braking = self.draft.braking.sup(&reference.qdd.abs());
@@ -52,13 +49,13 @@ impl Planner {
         Ok(())
     }
 
-    /// Makes the trajectory of the draft.
+    /// Makes the draft the trajectory.
     pub(super) fn finish(
         &mut self,
         budget: &TorqueBudget<'_>,
         time_scale: f32,
     ) -> Result<(), Refusal> {
-        // Past the end, so that rounding of the last sample cannot leave the arm short of it.
+        // Past the end, so that rounding in the last sample cannot leave the arm short of it.
         let past = self.draft.span + 1.0;
         self.draft.end = self.draft.at(budget.arm, past).map_err(from_path)?.q;
         self.draft.braking *= time_scale * time_scale;
@@ -67,8 +64,8 @@ impl Planner {
         Ok(())
     }
 
-    /// Where the last pass looks after `t`, s: inertia changes along the way, and at the border of a segment torque is
-    /// often greatest.
+    /// The sample of the last pass after `t`, s: inertia changes along the way, and torque often peaks at a segment
+    /// border.
     pub(super) fn next_sample(&self, t: f32) -> f32 {
         let Trajectory {
             path,
@@ -83,7 +80,7 @@ impl Planner {
             Path::Line { .. } => LINE_STEPS,
         };
         let step = span / f32::from(steps);
-        // A border next to the last sample adds nothing, and rounding must not keep the walk from going on.
+        // A border next to the last sample adds nothing, and rounding must not stall the pass.
         let soon = t + 0.05 * step;
         let mut next = (t + step).min(*span);
         next = next.min(start + profile.border_after(soon - start));
