@@ -23,7 +23,7 @@
 use crate::e2e::Profile;
 use crate::frame::{self, CanFrame, Id};
 use crate::hash;
-use crate::messages::{Node, Server};
+use crate::messages::{Hello, Node, Server};
 use crate::schema::{Content, Kind, MessageInfo, Rate};
 use crate::signals;
 
@@ -244,6 +244,25 @@ pub const fn emergency(node: Node) -> &'static MessageInfo {
 /// Hash of the whole table, computed at compile time: two nodes of one hash agree on every identifier, length, offset,
 /// type, range, unit and code.
 pub const HASH: u32 = hash::schema(&TABLE);
+
+/// What every node of this version says in the handshake.
+pub const HELLO: Hello = Hello {
+    schema: HASH,
+    build: number(env!("CARGO_PKG_VERSION_MAJOR")) << 16
+        | number(env!("CARGO_PKG_VERSION_MINOR")) << 8
+        | number(env!("CARGO_PKG_VERSION_PATCH")),
+    profile: Hello::PROFILE_FD,
+};
+
+/// A part of the version as a byte of the build.
+const fn number(text: &str) -> u32 {
+    let number = match u32::from_str_radix(text, 10) {
+        Ok(number) => number,
+        Err(_) => u32::MAX,
+    };
+    assert!(number < 256, "a part of the version is no byte");
+    number
+}
 
 /// Message of this 11-bit identifier, or `None`.
 #[must_use]

@@ -2,16 +2,12 @@
 
 use protocol::bus::Transmit;
 use protocol::e2e::Verdict;
-use protocol::messages::{
-    Hello, Message, ParameterError, ParameterReply, ParameterRequest, Server,
-};
+use protocol::messages::{Message, ParameterError, ParameterReply, ParameterRequest, Server};
 use protocol::parameters::{self, ControllerParameter};
 use protocol::table;
 
 use super::Node;
 
-/// Identifies the build in the handshake.
-const BUILD: u32 = 1;
 /// Last number that is answered here.
 const LAST: u16 = {
     let [.., last] = ControllerParameter::ALL else {
@@ -38,11 +34,7 @@ impl Node {
         let reply = match *request {
             ParameterRequest::Hello(peer) => {
                 self.same_schema = peer.schema == table::HASH;
-                ParameterReply::Hello(Hello {
-                    schema: table::HASH,
-                    build: BUILD,
-                    profile: Hello::PROFILE_FD,
-                })
+                ParameterReply::Hello(table::HELLO)
             }
             // The first frame of an operator may be a replay: it must not change anything.
             ParameterRequest::Set { index, .. } if verdict == Verdict::Initial => {

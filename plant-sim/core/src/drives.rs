@@ -9,7 +9,7 @@ use protocol::codec::{self, Encoder};
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Command, ControlWord, DriveStatus, Feedback, Hello, Message, ParameterError, ParameterReply,
+    Command, ControlWord, DriveStatus, Feedback, Message, ParameterError, ParameterReply,
     ParameterRequest, Server,
 };
 use protocol::parameters::{self, DriveParameter};
@@ -137,13 +137,8 @@ impl Drives {
                     limit: 0.0,
                 }
             }
-            _ => parameters::serve(&mut self.settings, &request).unwrap_or(ParameterReply::Hello(
-                Hello {
-                    schema: table::HASH,
-                    build: 0,
-                    profile: Hello::PROFILE_FD,
-                },
-            )),
+            _ => parameters::serve(&mut self.settings, &request)
+                .unwrap_or(ParameterReply::Hello(table::HELLO)),
         };
         let message = Message::ParameterReply(Server::Drives, reply);
         let frame = self.encoder.encode(&message);

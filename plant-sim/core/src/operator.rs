@@ -196,12 +196,7 @@ impl Operator {
     fn begin(&mut self, action: &Action) -> Option<CanFrame> {
         let message = match action {
             Action::Hello => {
-                let hello = Hello {
-                    schema: table::HASH,
-                    build: 0,
-                    profile: Hello::PROFILE_FD,
-                };
-                Message::ParameterRequest(Server::Controller, ParameterRequest::Hello(hello))
+                Message::ParameterRequest(Server::Controller, ParameterRequest::Hello(table::HELLO))
             }
             Action::Request(request) => {
                 self.reply = None;

@@ -117,7 +117,7 @@ pub struct Hello {
     /// [`table::HASH`](crate::table::HASH) of the sender.
     #[serde(with = "postcard::fixint::le")]
     pub schema: u32,
-    /// Identifies the build, by the sender's own rule.
+    /// Version of the sender: major, minor and patch number, a byte each from bit 16 down.
     #[serde(with = "postcard::fixint::le")]
     pub build: u32,
     /// Link profile in use.

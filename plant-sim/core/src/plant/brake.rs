@@ -22,7 +22,8 @@ pub struct Brake {
 }
 
 impl Brake {
-    /// From the command to the closed brake, ns.
+    /// From the command to the closed brake, ns. An estimate, as for every time and mass that no data sheet of this robot
+    /// gives; the controller waits for its own parameter `brake-delay`, which has a margin over both times.
     pub const ENGAGE_NS: u64 = 30_000_000;
     /// From the command to the open brake, ns.
     pub const RELEASE_NS: u64 = 50_000_000;

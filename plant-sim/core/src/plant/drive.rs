@@ -19,7 +19,8 @@ pub struct Drive {
 }
 
 /// Above its speed limit a motor's torque falls to zero over this part of the limit. The voltage that is left decides
-/// that on a real drive; below the limit the published torque is always available.
+/// that on a real drive; below the limit the published torque is always available. An estimate that only a run beyond the
+/// speed limit feels: a step instead of a slope would make the integration depend on where its steps lie.
 const SPEED_TAPER: f64 = 0.05;
 
 impl Drive {
