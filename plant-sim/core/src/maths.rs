@@ -29,3 +29,8 @@ pub(crate) fn tanh(x: f64) -> f64 {
 pub(crate) fn square(x: f64) -> f64 {
     x * x
 }
+
+/// What is left of `x` after the nearest multiple of `y`: exact, in [-y/2, y/2].
+pub(crate) fn remainder(x: f64, y: f64) -> f64 {
+    libm::remainder(x, y)
+}

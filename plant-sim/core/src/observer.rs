@@ -30,8 +30,8 @@ pub struct PlantState {
     pub tau: [f64; 4],
     /// Flange in frame 0: x, y, z (m), yaw (rad).
     pub tool: [f64; 4],
-    /// Whether a motor is asked for more torque than it can give.
-    pub saturated: bool,
+    /// Whether the motor of the axis gives all the torque that it can.
+    pub at_limit: [bool; 4],
 }
 
 impl PlantState {
@@ -44,7 +44,7 @@ impl PlantState {
             qd: plant.qd(),
             tau: plant.joint_effort(),
             tool: [pose.x, pose.y, pose.z, pose.yaw],
-            saturated: plant.is_saturated(),
+            at_limit: plant.at_limit(),
         }
     }
 }

@@ -158,6 +158,21 @@ impl Plant {
         self.saturated
     }
 
+    /// Which motors give all they can now. A request as close to the limit as single precision can say is one for all.
+    pub fn at_limit(&self) -> [bool; 4] {
+        let speed = self.drive.to_motor(&self.qd);
+        std::array::from_fn(|i| {
+            let (braking, driving) = self.drive.torque_bounds(i, speed[i]);
+            let rounding = f64::from(f32::EPSILON) * driving.max(-braking);
+            self.torque_enabled
+                && match self.request[i] {
+                    up if up > 0.0 => up >= driving - rounding,
+                    down if down < 0.0 => down <= braking + rounding,
+                    _ => false,
+                }
+        })
+    }
+
     /// Switches all motors on or off. The last request stays.
     pub fn set_torque_enabled(&mut self, enabled: bool) {
         self.torque_enabled = enabled;

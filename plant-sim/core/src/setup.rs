@@ -105,25 +105,23 @@ impl RunConfig {
         Ok(rig)
     }
 
-    /// Where the tool stands when a cycle has ended: x, y, z in frame 0, m.
-    pub fn cycle_target(&self) -> [f64; 3] {
-        let last = self
-            .scenario
-            .cycle
-            .iter()
-            .rev()
-            .find_map(|step| match step {
-                Step::Jump(jump) => Some(jump.to),
-                Step::Line(line) => Some(line.to),
+    /// Where the tool is to be when a cycle has ended: x, y, z (m) and yaw (rad) in frame 0; none after a stop on the path.
+    pub fn cycle_target(&self) -> Option<[f64; 4]> {
+        let mut target = Some(self.scenario.start);
+        for step in &self.scenario.cycle {
+            match step {
+                Step::Jump(jump) => target = Some(jump.to),
+                Step::Line(line) => target = Some(line.to),
                 Step::Joints(joints) => {
                     let arm = Arm::new(&self.actual, None);
                     let pose = arm.pose(&arm.at(&joints.to.into()));
-                    Some([pose.x, pose.y, pose.z, pose.yaw])
+                    target = Some([pose.x, pose.y, pose.z, pose.yaw]);
                 }
-                Step::Dwell(_) | Step::Stop(_) | Step::Pick(_) | Step::Place {} => None,
-            });
-        let [x, y, z, _] = last.unwrap_or(self.scenario.start);
-        [x, y, z]
+                Step::Stop(_) => target = None,
+                Step::Dwell(_) | Step::Pick(_) | Step::Place {} => {}
+            }
+        }
+        target
     }
 }
 

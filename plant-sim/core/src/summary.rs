@@ -31,28 +31,36 @@ pub struct Summary {
     pub payload_kg: f64,
     /// Cycles completed.
     pub cycles: u32,
+    /// Cycles that the scenario asks for.
+    pub cycles_asked: u32,
+    /// Completed cycles in which nothing moved. They have no times, and none below counts them.
+    pub cycles_still: u32,
     /// Whether the scenario ran to its end.
     pub completed: bool,
     /// Why not.
     pub error: Option<String>,
     /// Whether the arm stood still behind its closed brake in the end.
     pub at_rest: bool,
-    /// From the start of motion until the tool is back within 1 mm and stays.
+    /// From the start of motion until the tool is back within 1 mm and 10 mrad and stays.
     pub cycle_time_s: Option<Spread>,
-    /// From the end of the commanded motion until the tool is within 0.01 mm and stays.
+    /// From the end of the commanded motion until the tool is within 0.01 mm and 0.1 mrad and stays.
     pub settle_time_s: Option<MeanMax>,
     /// True tool to commanded tool at the same instant, while the reference moves.
     pub tracking_error_mm: RmsMax,
+    /// True yaw to commanded yaw at the same instant, while the reference moves.
+    pub tracking_error_mrad: RmsMax,
     /// Distance from the target at the end of a dwell.
     pub final_error_mm: FinalError,
+    /// Yaw away from the target at the end of a dwell.
+    pub final_error_mrad: FinalError,
     /// Peak effort over its limit.
     pub torque_utilisation: [f64; 4],
     /// Root-mean-square effort over the continuous limit.
     pub thermal_utilisation: [f64; 4],
     /// Peak speed over its limit.
     pub speed_utilisation: [f64; 4],
-    /// Longest time with a motor at its limit.
-    pub longest_saturation_s: f64,
+    /// Longest time for which the motor gave all it can, by axis, as the plant saw it.
+    pub longest_saturation_s: [f64; 4],
     /// Share of the time that the bus was taken.
     pub bus_load: f64,
     /// Frames delivered.
@@ -69,10 +77,10 @@ pub struct Summary {
     pub each_cycle: Vec<CycleResult>,
 }
 
-/// Greatest distance from the target.
+/// Greatest offset from the target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FinalError {
-    /// mm.
+    /// mm or mrad; `null` where no cycle was completed that has a target.
     pub max: Option<f64>,
 }
 
@@ -115,7 +123,7 @@ pub struct Collector {
     faults: Vec<Fault>,
     /// An emergency has come, and no state since.
     awaits_state: bool,
-    target: [f64; 3],
+    target: Option<[f64; 4]>,
     /// Whether a command has come since the last sample; `None` before the first of all.
     answered: Option<bool>,
     overruns: u64,
@@ -157,19 +165,27 @@ impl Collector {
             rate_hz: scenario.rate_hz,
             payload_kg: scenario.payload.map_or(0.0, |payload| payload.mass),
             cycles: metrics.cycles.len() as u32,
+            cycles_asked: scenario.cycles,
+            cycles_still: metrics.still() as u32,
             completed: result.is_ok(),
             error: result.as_ref().err().map(ToString::to_string),
             at_rest: rig.is_at_rest(),
             cycle_time_s: metrics.cycle_time_s(),
             settle_time_s: metrics.settle_time_s(),
             tracking_error_mm: metrics.tracking_error_mm(),
+            tracking_error_mrad: metrics.tracking_error_mrad(),
             final_error_mm: FinalError {
                 max: metrics.final_error_mm(),
+            },
+            final_error_mrad: FinalError {
+                max: metrics.final_error_mrad(),
             },
             torque_utilisation: metrics.torque_utilisation(),
             thermal_utilisation: metrics.thermal_utilisation(),
             speed_utilisation: metrics.speed_utilisation(),
-            longest_saturation_s: metrics.longest_saturation as f64 / scenario.rate_hz,
+            longest_saturation_s: metrics
+                .longest_saturation
+                .map(|samples| samples as f64 / scenario.rate_hz),
             bus_load: bus.total.load(sim.since(Instant::ORIGIN)),
             frames: bus.total.frames,
             overruns,

@@ -1,6 +1,7 @@
 //! `plant-sim run`: a scenario from start to summary.
 
-use std::fmt::Write as _;
+mod text;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,7 +12,7 @@ use link::{AddressError, LinkAddress, SlcanPeer};
 use plant_sim::external::{LockStep, RealTime, WallClock};
 use plant_sim::input;
 use plant_sim::qemu::{self, Channel, Qemu};
-use plant_sim::run::{self, Results};
+use plant_sim::run;
 use plant_sim::viewers::Viewers;
 use protocol::time::Period;
 use sim::controller::InProcess;
@@ -201,7 +202,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, String> {
     if args.json {
         show(&results.to_json())?;
     } else {
-        show(&report(&results, &args.out))?;
+        show(&text::report(&results, &config, &args.out))?;
     }
     match &results.summary.error {
         None => Ok(ExitCode::SUCCESS),
@@ -273,125 +274,4 @@ pub(super) fn load(path: Option<&PathBuf>) -> Result<RobotModel, String> {
         eprintln!("plant-sim: warning: {}: {warning}", path.display());
     }
     Ok(model)
-}
-
-/// A line of text; writing to a string cannot fail.
-macro_rules! line {
-    ($text:ident, $($arg:tt)*) => {{
-        let _ = writeln!($text, $($arg)*);
-    }};
-}
-
-/// The summary as a person reads it.
-fn report(results: &Results, out: &Path) -> String {
-    let summary = &results.summary;
-    let mut text = String::new();
-    let percent = |shares: &[f64; 4]| {
-        shares
-            .map(|share| format!("{:3.0} %", share * 100.0))
-            .join("  ")
-    };
-    line!(
-        text,
-        "{} on {}, {} kg, {} at {} Hz, {} cycles",
-        summary.scenario,
-        summary.robot,
-        summary.payload_kg,
-        summary.law,
-        summary.rate_hz,
-        summary.cycles
-    );
-    match &summary.cycle_time_s {
-        Some(time) => line!(
-            text,
-            "  cycle time        {:.4} s mean ({:.4} to {:.4}), back within 1 mm",
-            time.mean,
-            time.min,
-            time.max
-        ),
-        None => line!(text, "  cycle time        never back within 1 mm"),
-    }
-    match &summary.settle_time_s {
-        Some(time) => line!(
-            text,
-            "  settling          {:.1} ms mean, {:.1} ms max, to 0.01 mm after the commanded end",
-            time.mean * 1e3,
-            time.max * 1e3
-        ),
-        None => line!(text, "  settling          not within 0.01 mm"),
-    }
-    line!(
-        text,
-        "  tracking error    {:.4} mm rms, {:.4} mm max",
-        summary.tracking_error_mm.rms,
-        summary.tracking_error_mm.max
-    );
-    if let Some(error) = summary.final_error_mm.max {
-        line!(text, "  final error       {error:.4} mm max");
-    }
-    line!(text, "                    shoulder  elbow  lift  wrist");
-    line!(
-        text,
-        "  torque, peak      {}",
-        percent(&summary.torque_utilisation)
-    );
-    line!(
-        text,
-        "  torque, thermal   {}",
-        percent(&summary.thermal_utilisation)
-    );
-    line!(
-        text,
-        "  speed, peak       {}",
-        percent(&summary.speed_utilisation)
-    );
-    line!(
-        text,
-        "  saturation        {:.1} ms at most",
-        summary.longest_saturation_s * 1e3
-    );
-    line!(
-        text,
-        "  bus               {:.1} % load, {} frames, {} lost, {} overruns",
-        summary.bus_load * 100.0,
-        summary.frames,
-        summary.frames_lost,
-        summary.overruns
-    );
-    match summary.faults.as_slice() {
-        [] => line!(text, "  faults            none"),
-        faults => {
-            for fault in faults {
-                line!(
-                    text,
-                    "  fault             {:.3} s: {} (code {}: {})",
-                    fault.time_s,
-                    fault.text,
-                    fault.code,
-                    fault.description
-                );
-            }
-        }
-    }
-    if !summary.completed {
-        let rest = if summary.at_rest {
-            "at rest behind its brake"
-        } else {
-            "not at rest"
-        };
-        line!(text, "  arm in the end    {rest}");
-    }
-    line!(
-        text,
-        "  simulated         {:.2} s in {:.3} s: {:.0} times real time",
-        summary.sim_time_s,
-        results.wall_time_s,
-        results.real_time_factor
-    );
-    line!(
-        text,
-        "  trace.log, truth.csv, summary.json in {}",
-        out.display()
-    );
-    text
 }

@@ -93,21 +93,25 @@ impl Drive {
         })
     }
 
-    /// The torques (N m) that the motors give when asked for `request` at motor speeds `speed` (rad/s).
+    /// Least and greatest torque (N m) that the motor of `axis` can give at `speed` (rad/s).
     ///
     /// The torque limit holds in both directions; above the speed limit a motor can still brake but hardly drive.
+    pub fn torque_bounds(&self, axis: usize, speed: f64) -> (f64, f64) {
+        let limit = self.train.motor_torque_limit[axis];
+        let top = self.train.motor_speed_limit[axis];
+        let driving = limit * (1.0 - (speed.abs() - top) / (SPEED_TAPER * top)).clamp(0.0, 1.0);
+        if speed >= 0.0 {
+            (-limit, driving)
+        } else {
+            (-driving, limit)
+        }
+    }
+
+    /// The torques (N m) that the motors give when asked for `request` at motor speeds `speed` (rad/s).
     pub fn limited(&self, request: &Vector4<f64>, speed: &Vector4<f64>) -> Vector4<f64> {
-        let train = &self.train;
         Vector4::from_fn(|i, _| {
-            let limit = train.motor_torque_limit[i];
-            let top = train.motor_speed_limit[i];
-            let driving =
-                limit * (1.0 - (speed[i].abs() - top) / (SPEED_TAPER * top)).clamp(0.0, 1.0);
-            if speed[i] >= 0.0 {
-                request[i].clamp(-limit, driving)
-            } else {
-                request[i].clamp(-driving, limit)
-            }
+            let (least, greatest) = self.torque_bounds(i, speed[i]);
+            request[i].clamp(least, greatest)
         })
     }
 }

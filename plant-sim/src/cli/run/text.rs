@@ -1,0 +1,197 @@
+//! The summary of a run as a person reads it.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use plant_sim::run::Results;
+use sim::setup::RunConfig;
+use sim::summary::Summary;
+
+/// A line of text; writing to a string cannot fail.
+macro_rules! line {
+    ($text:ident, $($arg:tt)*) => {{
+        let _ = writeln!($text, $($arg)*);
+    }};
+}
+
+/// The summary as a person reads it; the files are in `out`.
+pub(super) fn report(results: &Results, config: &RunConfig, out: &Path) -> String {
+    let summary = &results.summary;
+    let mut text = String::new();
+    line!(
+        text,
+        "{} on {}, {} kg, {} at {} Hz, {}",
+        summary.scenario,
+        config.actual.name,
+        summary.payload_kg,
+        summary.law,
+        summary.rate_hz,
+        cycles(summary)
+    );
+    difference(config, &mut text);
+    motion(summary, &mut text);
+    load(summary, &mut text);
+    line!(
+        text,
+        "  bus               {:.1} % load, {} frames, {} lost, {} overruns",
+        summary.bus_load * 100.0,
+        summary.frames,
+        summary.frames_lost,
+        summary.overruns
+    );
+    end(summary, &mut text);
+    line!(
+        text,
+        "  simulated         {:.2} s in {:.3} s: {:.0} times real time",
+        summary.sim_time_s,
+        results.wall_time_s,
+        results.real_time_factor
+    );
+    line!(
+        text,
+        "  trace.log, truth.csv, summary.json in {}",
+        out.display()
+    );
+    text
+}
+
+fn cycles(summary: &Summary) -> String {
+    match (summary.cycles, summary.cycles_asked) {
+        (1, 1) => "1 cycle".into(),
+        (done, asked) if done == asked => format!("{done} cycles"),
+        (done, asked) => format!("{done} of {asked} cycles"),
+    }
+}
+
+/// What the controller is wrong about.
+fn difference(config: &RunConfig, text: &mut String) {
+    let mismatch = &config.scenario.mismatch;
+    let mut wrong = Vec::new();
+    if config.nominal.name != config.actual.name {
+        wrong.push(format!(
+            "the controller is made for {}",
+            config.nominal.name
+        ));
+    } else if config.nominal != config.actual {
+        wrong.push("the controller's model of it has other numbers".into());
+    }
+    if mismatch.friction != 1.0 {
+        wrong.push(format!(
+            "true friction is {} times what it believes",
+            mismatch.friction
+        ));
+    }
+    if mismatch.payload != 1.0 {
+        wrong.push(format!(
+            "true payload is {} times what it believes",
+            mismatch.payload
+        ));
+    }
+    if !wrong.is_empty() {
+        line!(text, "  mismatch          {}", wrong.join("; "));
+    }
+}
+
+fn motion(summary: &Summary, text: &mut String) {
+    let still = summary.cycles_still;
+    if still > 0 {
+        line!(
+            text,
+            "  nothing moved     in {still} of {}, which have no times",
+            cycles(summary)
+        );
+    }
+    match &summary.cycle_time_s {
+        Some(time) => line!(
+            text,
+            "  cycle time        {:.4} s mean ({:.4} to {:.4}), back within 1 mm and 10 mrad",
+            time.mean,
+            time.min,
+            time.max
+        ),
+        None => line!(text, "  cycle time        none: {}", no_time(summary)),
+    }
+    match &summary.settle_time_s {
+        Some(time) => line!(
+            text,
+            "  settling          {:.1} ms mean, {:.1} ms max, to 0.01 mm and 0.1 mrad after the commanded end",
+            time.mean * 1e3,
+            time.max * 1e3
+        ),
+        None if summary.cycle_time_s.is_some() => {
+            line!(text, "  settling          not within 0.01 mm and 0.1 mrad");
+        }
+        None => {}
+    }
+    line!(
+        text,
+        "  tracking error    {:.4} mm rms, {:.4} mm max; yaw {:.4} mrad rms, {:.4} mrad max",
+        summary.tracking_error_mm.rms,
+        summary.tracking_error_mm.max,
+        summary.tracking_error_mrad.rms,
+        summary.tracking_error_mrad.max
+    );
+    if let (Some(distance), Some(yaw)) = (summary.final_error_mm.max, summary.final_error_mrad.max)
+    {
+        line!(
+            text,
+            "  final error       {distance:.4} mm max; yaw {yaw:.4} mrad max"
+        );
+    }
+}
+
+/// Why there is no cycle time.
+fn no_time(summary: &Summary) -> &'static str {
+    if summary.each_cycle.is_empty() {
+        "no cycle was completed"
+    } else if summary.each_cycle.iter().all(|cycle| !cycle.moved) {
+        "nothing moved"
+    } else if summary.final_error_mm.max.is_none() {
+        "the cycle ends in a stop on its path"
+    } else {
+        "not every cycle came back within 1 mm and 10 mrad"
+    }
+}
+
+/// What the axes had to give.
+fn load(summary: &Summary, text: &mut String) {
+    let row = |name: &str, values: [String; 4]| {
+        let [shoulder, elbow, lift, wrist] = values;
+        format!("  {name:<18}{shoulder:>8} {elbow:>8} {lift:>8} {wrist:>8}\n")
+    };
+    let percent = |shares: [f64; 4]| shares.map(|share| format!("{:.0} %", share * 100.0));
+    *text += &row("", ["shoulder", "elbow", "lift", "wrist"].map(String::from));
+    *text += &row("torque, peak", percent(summary.torque_utilisation));
+    *text += &row("torque, thermal", percent(summary.thermal_utilisation));
+    *text += &row("speed, peak", percent(summary.speed_utilisation));
+    let saturation = summary.longest_saturation_s;
+    *text += &row(
+        "at its limit",
+        saturation.map(|time| format!("{:.1} ms", time * 1e3)),
+    );
+}
+
+/// How it ended.
+fn end(summary: &Summary, text: &mut String) {
+    if summary.faults.is_empty() {
+        line!(text, "  faults            none");
+    }
+    for fault in &summary.faults {
+        line!(
+            text,
+            "  fault             {:.3} s: {} (code {}: {})",
+            fault.time_s,
+            fault.text,
+            fault.code,
+            fault.description
+        );
+    }
+    if !summary.completed {
+        let rest = if summary.at_rest {
+            "at rest behind its brake"
+        } else {
+            "not at rest"
+        };
+        line!(text, "  arm in the end    {rest}");
+    }
+}
