@@ -17,6 +17,7 @@ fn main() {
     let root = root();
     let version = env!("CARGO_PKG_VERSION");
     let commit = commit(&root).unwrap_or("unknown commit".into());
+    println!("cargo:rustc-env=COMMIT={commit}");
     println!("cargo:rustc-env=VERSION_AND_COMMIT={version} ({commit})");
     let sources = SOURCES.map(|source| root.join(source));
     // HEAD moves with a checkout, its log with every commit.

@@ -59,7 +59,10 @@ pub fn scenario(name: &str) -> Result<Scenario, InputError> {
 /// # Errors
 /// See [`InputError`].
 pub fn robot(path: &Path) -> Result<(RobotModel, Vec<String>), InputError> {
-    RobotModel::from_json(&text(path)?).map_err(|source| in_file(path, source))
+    let (mut model, warnings) =
+        RobotModel::from_json(&text(path)?).map_err(|source| in_file(path, source))?;
+    model.source.origin = path.display().to_string();
+    Ok((model, warnings))
 }
 
 /// The payload in this file.

@@ -33,7 +33,13 @@ pub enum ExecuteError {
 /// What a run came to, as `summary.json` holds it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Results {
-    /// What is judged.
+    /// Version of the program.
+    pub version: &'static str,
+    /// Commit that it was built from, its date, and whether sources were modified.
+    pub commit: &'static str,
+    /// Command line.
+    pub command: Vec<String>,
+    /// What was run, and what is judged.
     #[serde(flatten)]
     pub summary: Summary,
     /// Time the run took on this machine, s.
@@ -103,6 +109,11 @@ pub fn execute_with<C: Peer, P: Pace, O: Observer>(
     let (trace, hash) = trace.finish().map_err(failed)?;
     let truth = truth.finish().map_err(failed)?;
     let results = Results {
+        version: env!("CARGO_PKG_VERSION"),
+        commit: env!("COMMIT"),
+        command: std::env::args_os()
+            .map(|word| word.to_string_lossy().into_owned())
+            .collect(),
         real_time_factor: summary.sim_time_s / wall_time_s,
         summary,
         wall_time_s,

@@ -9,6 +9,20 @@ mod read;
 
 use thiserror::Error;
 
+use crate::text::Source;
+
+/// Models that come with the program: name and text.
+const BUILT_IN: [(&str, &str); 2] = [
+    (
+        "irb930-22-1.05",
+        include_str!("../../models/irb930-22-1.05.json"),
+    ),
+    (
+        "irb930-12-0.85",
+        include_str!("../../models/irb930-12-0.85.json"),
+    ),
+];
+
 /// Everything the simulator knows about a robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotModel {
@@ -26,6 +40,8 @@ pub struct RobotModel {
     pub drive: DriveTrain,
     /// Heaviest allowed payload, kg.
     pub payload_max: f64,
+    /// What all this was read from. Numbers that are changed afterwards are not in it.
+    pub source: Source,
 }
 
 /// Standard Denavit-Hartenberg lengths, m. The twists are always 0, pi, 0, 0: that is what makes the robot a SCARA.
@@ -159,21 +175,37 @@ pub enum ModelErrorKind {
 impl RobotModel {
     /// The default robot: IRB 930-22/1.05.
     pub fn irb_930_22_105() -> Self {
-        Self::built_in(include_str!("../../models/irb930-22-1.05.json"))
+        Self::built_in("irb930-22-1.05").expect("a name of the list")
     }
 
     /// The short one: IRB 930-12/0.85.
     pub fn irb_930_12_085() -> Self {
-        Self::built_in(include_str!("../../models/irb930-12-0.85.json"))
+        Self::built_in("irb930-12-0.85").expect("a name of the list")
     }
 
-    fn built_in(text: &str) -> Self {
-        Self::from_json(text)
-            .expect("the built-in models are valid")
-            .0
+    /// The model of this name that comes with the program.
+    pub fn built_in(name: &str) -> Option<Self> {
+        let (name, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
+        let (mut model, _) = Self::from_json(text).expect("the built-in models are valid");
+        model.source.origin = (*name).into();
+        Some(model)
     }
 
-    /// Reads the text of a model file.
+    /// Whether this is the text of a model that comes with the program.
+    pub fn is_built_in(text: &str) -> bool {
+        BUILT_IN.iter().any(|(_, known)| *known == text)
+    }
+
+    /// Whether both are the same robot, wherever their numbers are from.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let source = other.source.clone();
+        Self {
+            source,
+            ..self.clone()
+        } == *other
+    }
+
+    /// Reads the text of a model file. Where the text is from, `source.origin`, is left to the caller.
     ///
     /// Returns the model and one warning for each key that means nothing here, and for each derived number
     /// (`com_dh_frame`, `lc`) that contradicts what it is derived from; the derived numbers themselves are not used.

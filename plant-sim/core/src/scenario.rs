@@ -2,11 +2,13 @@
 
 mod check;
 
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::model::Payload;
 use crate::selection::LawChoice;
 use crate::text::nearest;
+
+pub use crate::text::Source;
 
 /// Scenarios that come with the program: name and text.
 const BUILT_IN: [(&str, &str); 4] = [
@@ -23,7 +25,7 @@ const BUILT_IN: [(&str, &str); 4] = [
 ];
 
 /// A run, ready to be executed. Lengths in m in frame 0, angles in rad.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Name, for the summary.
@@ -35,13 +37,13 @@ pub struct Scenario {
     /// Control law and compensation, such as `computed-torque:observer`.
     pub law: LawChoice,
     /// Gains, where not the controller's own.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainsSpec>,
     /// Tool pose at the start: x, y, z, yaw. The elbow is at the positive side.
     #[serde(deserialize_with = "exactly")]
     pub start: [f64; 4],
     /// What the flange carries from the start.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub payload: Option<PayloadSpec>,
     /// How the true robot differs from what the controller believes.
     #[serde(default)]
@@ -51,15 +53,6 @@ pub struct Scenario {
     /// The text that all this was read from; messages find their place in it.
     #[serde(skip)]
     pub source: Source,
-}
-
-/// Where a scenario comes from.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Source {
-    /// File or name.
-    pub origin: String,
-    /// TOML.
-    pub text: String,
 }
 
 /// An array of exactly so many numbers: serde alone ignores surplus elements.
@@ -76,7 +69,7 @@ fn exactly<'de, D: Deserializer<'de>, const N: usize>(
 }
 
 /// Gains of the closed loop, the same for every law.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct GainsSpec {
     /// Natural frequency of the error dynamics, rad/s.
@@ -88,7 +81,7 @@ pub struct GainsSpec {
 }
 
 /// A payload as model files write it.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PayloadSpec {
     /// kg.
@@ -133,7 +126,7 @@ impl From<PayloadSpec> for Payload {
 }
 
 /// True value over the value that the controller believes.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mismatch {
     /// Of viscous and Coulomb friction of every axis.
@@ -152,7 +145,7 @@ impl Default for Mismatch {
 }
 
 /// One step of a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Step {
     /// Gate move: up, across, down.
@@ -172,7 +165,7 @@ pub enum Step {
 }
 
 /// A gate move.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Jump {
     /// Flange at the end: x, y, z (m) and yaw (rad) in frame 0.
@@ -188,7 +181,7 @@ pub struct Jump {
 }
 
 /// A move to a pose or to joint positions.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
     /// Flange x, y, z (m) and yaw (rad) in frame 0, or the four joint positions (rad, rad, m, rad).
@@ -263,6 +256,14 @@ impl Scenario {
         };
         scenario.check()?;
         Ok(scenario)
+    }
+
+    /// The text of a scenario file that says all this, and nothing by default.
+    ///
+    /// # Panics
+    /// Never: numbers and texts can be written.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("numbers and texts can be written")
     }
 
     /// The payload of `kg` that a person asks for by weight alone: the scenario's own body, as much denser or lighter, or a

@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use protocol::messages::{Compensation, Law};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize, Serializer};
 
 /// A control law and what helps it against friction and payload error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -63,6 +63,12 @@ impl TryFrom<String> for LawChoice {
 
     fn try_from(text: String) -> Result<Self, LawError> {
         text.parse()
+    }
+}
+
+impl Serialize for LawChoice {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 

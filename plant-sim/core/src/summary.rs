@@ -1,14 +1,18 @@
 //! What a run is judged by, gathered while it goes.
 
+mod recipe;
+
 use std::io;
 
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{FaultAxis, Message, Node};
+use protocol::messages::{Cause, FaultAxis, Message, Node, State};
 use protocol::schema::Content;
 use protocol::table;
 use protocol::time::Instant;
 use serde::Serialize;
+
+pub use recipe::{Model, Models, Recipe};
 
 use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
 use crate::observer::{Observer, Truth};
@@ -19,16 +23,9 @@ use crate::world::CellEvent;
 /// Summary of a run, as `summary.json` holds it. Times in s, lengths in mm, shares of 1.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
-    /// Scenario.
-    pub scenario: String,
-    /// Robot that the controller believes in.
-    pub robot: String,
-    /// Law and compensation.
-    pub law: String,
-    /// Control rate.
-    pub rate_hz: f64,
-    /// Announced payload.
-    pub payload_kg: f64,
+    /// What was run.
+    #[serde(flatten)]
+    pub recipe: Recipe,
     /// Cycles completed.
     pub cycles: u32,
     /// Cycles that the scenario asks for.
@@ -39,6 +36,10 @@ pub struct Summary {
     pub completed: bool,
     /// Why not.
     pub error: Option<String>,
+    /// State of the controller in the end, as it reported it; `null` if it never did.
+    pub state: Option<&'static str>,
+    /// Fault that is latched in the end.
+    pub fault: Option<String>,
     /// Whether the arm stood still behind its closed brake in the end.
     pub at_rest: bool,
     /// From the start of motion until the tool is back within 1 mm and 10 mrad and stays.
@@ -121,6 +122,8 @@ impl Fault {
 pub struct Collector {
     metrics: Metrics,
     faults: Vec<Fault>,
+    /// The last state.
+    state: Option<State>,
     /// An emergency has come, and no state since.
     awaits_state: bool,
     target: Option<[f64; 4]>,
@@ -135,6 +138,7 @@ impl Collector {
         Self {
             metrics: Metrics::new(&config.actual),
             faults: Vec::new(),
+            state: None,
             awaits_state: false,
             target: config.cycle_target(),
             answered: None,
@@ -152,6 +156,7 @@ impl Collector {
         let Self {
             metrics,
             faults,
+            state,
             overruns,
             ..
         } = self;
@@ -159,16 +164,17 @@ impl Collector {
         let bus = rig.bus();
         let sim = rig.now();
         Summary {
-            scenario: scenario.name.clone(),
-            robot: config.nominal.name.clone(),
-            law: scenario.law.to_string(),
-            rate_hz: scenario.rate_hz,
-            payload_kg: scenario.payload.map_or(0.0, |payload| payload.mass),
+            recipe: Recipe::new(config),
             cycles: metrics.cycles.len() as u32,
             cycles_asked: scenario.cycles,
             cycles_still: metrics.still() as u32,
             completed: result.is_ok(),
             error: result.as_ref().err().map(ToString::to_string),
+            state: state.map(|state| state.mode.name()),
+            fault: state
+                .map(|state| state.fault())
+                .filter(|fault| fault.cause != Cause::None)
+                .map(|fault| fault.to_string()),
             at_rest: rig.is_at_rest(),
             cycle_time_s: metrics.cycle_time_s(),
             settle_time_s: metrics.settle_time_s(),
@@ -205,7 +211,7 @@ impl Observer for Collector {
                 self.answered = Some(true);
                 return Ok(());
             }
-            Some(Content::State) if self.awaits_state => {}
+            Some(Content::State) => {}
             _ => return Ok(()),
         }
         let Ok(received) = codec::decode(frame) else {
@@ -230,7 +236,9 @@ impl Observer for Collector {
             }
             // What had no room in the emergency follows at once, unless a state of before is still under way.
             Message::State(state) => {
-                if let Some(last) = self.faults.last_mut()
+                self.state = Some(state);
+                if self.awaits_state
+                    && let Some(last) = self.faults.last_mut()
                     && last.cause == state.cause.name()
                 {
                     self.awaits_state = false;

@@ -1,4 +1,13 @@
-//! Places and words in text that a person wrote, for messages about them.
+//! Text that a person wrote: where it is from, and places and words in it for messages about them.
+
+/// Where a scenario or a model comes from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Source {
+    /// File, or the name of one that comes with the program.
+    pub origin: String,
+    /// All of it.
+    pub text: String,
+}
 
 /// Line and column of a byte in `text`, counted from 1; columns count characters.
 pub(crate) fn place(text: &str, at: usize) -> (usize, usize) {

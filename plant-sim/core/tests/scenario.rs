@@ -1,6 +1,6 @@
 //! Scenario texts: what is refused before anything runs, where, and what is allowed.
 
-use sim::scenario::Scenario;
+use sim::scenario::{Scenario, Source};
 use sim::setup::RunConfig;
 
 const BASE: &str = "name = \"t\"
@@ -251,4 +251,24 @@ fn a_hand_is_followed_from_cycle_to_cycle() {
             .rig()
             .is_ok()
     );
+}
+
+#[test]
+fn a_scenario_written_out_reads_back_as_it_is() {
+    let every_step = format!(
+        "{BASE}[gains]\nbandwidth = 100.1\ndamping = 0.7\nobserver = 1e1\n[mismatch]\nfriction = 1.25\n\
+         [[cycle]]\nline = {{ to = [0.1, 0.3333333333333333, -1e-17, 5e-324], speed = 0.25 }}\n\
+         [[cycle]]\njoints = {{ to = [0.0, 1.0, 0.1, -3.5] }}\n\
+         [[cycle]]\nstop = 0.25\n[[cycle]]\nplace = {{}}\n\
+         [[cycle]]\npick = {{ mass = 1, com_flange_frame = [0, 0, 0], inertia_com_diag = [0, 0, 0] }}\n"
+    );
+    for text in [BASE, &every_step] {
+        let mut scenario = Scenario::parse(text, "x.toml").unwrap();
+        let written = scenario.to_toml();
+        let mut again = Scenario::parse(&written, "x.toml").unwrap();
+        for scenario in [&mut scenario, &mut again] {
+            scenario.source = Source::default();
+        }
+        assert_eq!(format!("{scenario:?}"), format!("{again:?}"), "{written}");
+    }
 }

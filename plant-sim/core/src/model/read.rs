@@ -12,6 +12,7 @@ use super::json::{self, Node};
 use super::{Geometry, JointLimits, Link, ModelError, Payload, RobotModel};
 use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
 use crate::maths::hypot;
+use crate::text::Source;
 
 /// Tolerance within which a derived or an implied number repeats another one: model files carry rounded decimals.
 const SAME: f64 = 1e-9;
@@ -108,6 +109,10 @@ pub(super) fn robot(text: &str) -> Result<(RobotModel, Vec<String>), ModelError>
         payload_max: root
             .get("payload_rated_max_kg", "an object")?
             .number("max", Allowed::above_zero(100.0, "kg"))?,
+        source: Source {
+            origin: String::new(),
+            text: text.into(),
+        },
     };
     root.warn_of_unknown(ROOT, &mut warnings);
     Ok((model, warnings))

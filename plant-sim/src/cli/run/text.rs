@@ -21,11 +21,11 @@ pub(super) fn report(results: &Results, config: &RunConfig, out: &Path) -> Strin
     line!(
         text,
         "{} on {}, {} kg, {} at {} Hz, {}",
-        summary.scenario,
+        summary.recipe.scenario,
         config.actual.name,
-        summary.payload_kg,
-        summary.law,
-        summary.rate_hz,
+        summary.recipe.payload_kg,
+        summary.recipe.law,
+        summary.recipe.rate_hz,
         cycles(summary)
     );
     difference(config, &mut text);
@@ -72,7 +72,7 @@ fn difference(config: &RunConfig, text: &mut String) {
             "the controller is made for {}",
             config.nominal.name
         ));
-    } else if config.nominal != config.actual {
+    } else if !config.nominal.is_same(&config.actual) {
         wrong.push("the controller's model of it has other numbers".into());
     }
     if mismatch.friction != 1.0 {

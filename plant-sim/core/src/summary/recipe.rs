@@ -1,0 +1,95 @@
+//! What was run, and all that it takes to run it again.
+
+use firmware::control::laws::Gains;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use trace::LogHash;
+
+use crate::model::RobotModel;
+use crate::scenario::{GainsSpec, Mismatch, PayloadSpec};
+use crate::setup::RunConfig;
+
+/// What was run. With the same version of the program, `scenario_text` and the two models give the same trace and the
+/// same truth, to the byte; the rest is in them and stands here to be read.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Recipe {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The scenario as it was run, with all that the command line has changed: the text of a scenario file.
+    pub scenario_text: String,
+    /// Law and compensation.
+    pub law: String,
+    /// Control rate.
+    pub rate_hz: f64,
+    /// Gains in force.
+    pub gains: GainsSpec,
+    /// Mass of the payload at the start.
+    pub payload_kg: f64,
+    /// What the flange carries from the start, as the controller is told.
+    pub payload: Option<PayloadSpec>,
+    /// True value over the value that the controller believes.
+    pub mismatch: Mismatch,
+    /// The robot twice: as it is believed to be, and as it is.
+    pub models: Models,
+}
+
+/// The two robots of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Models {
+    /// The one that the controller believes in.
+    pub controller: Model,
+    /// The one that moves, before the mismatch.
+    pub robot: Model,
+}
+
+/// A robot, and where its numbers are from.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Model {
+    /// Name in the model file.
+    pub name: String,
+    /// The file, or the name of a model that comes with the program.
+    pub origin: String,
+    /// SHA-256 of the model file.
+    pub sha256: String,
+    /// The model file itself; `null` for a model that comes with the program.
+    pub text: Option<String>,
+}
+
+impl Recipe {
+    pub(super) fn new(config: &RunConfig) -> Self {
+        let scenario = &config.scenario;
+        Self {
+            scenario: scenario.name.clone(),
+            scenario_text: scenario.to_toml(),
+            law: scenario.law.to_string(),
+            rate_hz: scenario.rate_hz,
+            gains: scenario.gains.unwrap_or_else(|| {
+                let gains = Gains::for_period((1.0 / scenario.rate_hz) as f32);
+                GainsSpec {
+                    bandwidth: gains.bandwidth.into(),
+                    damping: gains.damping.into(),
+                    observer: gains.observer.into(),
+                }
+            }),
+            payload_kg: scenario.payload.map_or(0.0, |payload| payload.mass),
+            payload: scenario.payload,
+            mismatch: scenario.mismatch,
+            models: Models {
+                controller: Model::of(&config.nominal),
+                robot: Model::of(&config.actual),
+            },
+        }
+    }
+}
+
+impl Model {
+    fn of(robot: &RobotModel) -> Self {
+        let source = &robot.source;
+        Self {
+            name: robot.name.clone(),
+            origin: source.origin.clone(),
+            sha256: LogHash(Sha256::digest(&source.text).into()).to_string(),
+            text: (!RobotModel::is_built_in(&source.text)).then(|| source.text.clone()),
+        }
+    }
+}
