@@ -89,7 +89,7 @@ fn a_live_pipe_is_decoded_as_it_comes() {
         writeln!(input, "{line}").unwrap();
         let mut decoded = String::new();
         output.read_line(&mut decoded).unwrap();
-        assert!(decoded.contains("identifier of no message"), "{decoded}");
+        assert!(decoded.contains("unknown identifier"), "{decoded}");
     }
     drop(input);
     assert!(child.wait().unwrap().success());

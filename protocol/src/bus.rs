@@ -1,4 +1,5 @@
-//! The door between a node and its CAN controller. Frames are pushed in, with the time; what the node sends goes out here.
+//! The interface between a node and its CAN controller. Frames are pushed into the node with the time; the node sends
+//! through [`Transmit`].
 
 use core::fmt;
 
@@ -8,15 +9,15 @@ use crate::frame::CanFrame;
 pub trait Transmit {
     /// Puts a frame into the transmit queue.
     ///
-    /// `Ok` says that the controller took the frame, not that any node received it: CAN tells a sender only that
+    /// `Ok` means that the controller accepted the frame, not that any node received it: CAN only tells a sender that
     /// *somebody* acknowledged. Liveness is therefore always judged from frames received.
     ///
     /// # Errors
-    /// The frame was not taken and is not sent later; see [`TransmitError`].
+    /// The frame was not accepted and will not be sent later; see [`TransmitError`].
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError>;
 }
 
-/// A transmit side in a line of code.
+/// Any function that accepts frames is a transmit side.
 impl<F: FnMut(&CanFrame) -> Result<(), TransmitError>> Transmit for F {
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
         self(frame)
@@ -29,7 +30,7 @@ pub trait Bus: Transmit {
     fn receive(&mut self) -> Option<CanFrame>;
 }
 
-/// Why a frame was not taken for transmission.
+/// Why a frame was not accepted for transmission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TransmitError {

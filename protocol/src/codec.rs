@@ -1,13 +1,13 @@
 //! Message to frame and back.
 //!
-//! postcard reads malleable input: trailing bytes, overlong integers, NaN. Decoding therefore goes on
-//! after it, and in this order: identifier, format and length; CRC; postcard; padding zero and re-encoding equal to the
-//! input, so that each message has exactly one frame; every float finite and within its range. A frame that fails
+//! postcard reads malleable input: trailing bytes, overlong integers, NaN. Decoding therefore checks more, in this
+//! order: identifier, format and length; CRC; postcard; padding zero and re-encoding equal to the input, so that each
+//! message has exactly one frame; every float finite and within its range. A frame that fails
 //! anywhere yields an error and nothing else. The counter is judged outside, by [`Receiver`](crate::e2e::Receiver),
 //! because only the caller knows what was received before.
 //!
-//! The two messages of every sample go past postcard: they are packed without padding, so that each body that can be
-//! read has one form anyway.
+//! The two messages of every sample bypass postcard: they are packed without padding, so that every readable body has
+//! one form anyway.
 
 mod encoder;
 
@@ -23,7 +23,7 @@ use crate::table;
 
 pub use encoder::Encoder;
 
-/// A message as it came, with its end-to-end counter if it carries one.
+/// A received message, with its end-to-end counter if it carries one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Received {
@@ -33,7 +33,7 @@ pub struct Received {
     pub counter: Option<u8>,
 }
 
-/// A float that is not sent and not used.
+/// A float that must be neither sent nor used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ValueError {
@@ -63,7 +63,7 @@ pub enum ValueError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum EncodeError {
-    /// The receiver would refuse it.
+    /// A value that the receiver would refuse.
     Value(ValueError),
     /// Struct and table disagree on the length: a defect of this crate.
     TooLong,
@@ -73,9 +73,9 @@ pub enum EncodeError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DecodeError {
-    /// No message has this identifier; 29-bit identifiers are never ours.
+    /// No message has this identifier; no message has a 29-bit one.
     UnknownId,
-    /// Remote, or FD where classical is due, or the other way round.
+    /// Remote frame, or FD instead of classical or the reverse.
     WrongKind,
     /// Not the message's length.
     WrongLength {
@@ -84,7 +84,7 @@ pub enum DecodeError {
         /// Bytes of the message.
         expected: usize,
     },
-    /// The end-to-end CRC is not that of content and identifier.
+    /// The end-to-end CRC does not match content and identifier.
     Crc,
     /// A code or bit without meaning.
     Malformed,
@@ -94,17 +94,17 @@ pub enum DecodeError {
     Value(ValueError),
 }
 
-/// Frame of a message. `counter` counts the frames of the identifier, wrapping at 256; it is reduced to the width the
-/// frame has room for, and ignored where it has none.
+/// Frame of a message. `counter` counts the frames of the identifier, wrapping at 256; it is reduced to the width that
+/// the frame has room for, and ignored where there is none.
 ///
 /// # Errors
-/// A float is not finite or out of its range: what every receiver would refuse is not sent.
+/// A float is not finite or out of its range: what every receiver would refuse must not be sent.
 pub fn encode(message: &Message, counter: u8) -> Result<CanFrame, EncodeError> {
     encode_with(message, counter, |frame| *frame)
 }
 
-/// As [`encode`], for a sender that only looks at the frame: to return one is to copy it, which takes longer than to
-/// make it.
+/// Like [`encode`], for a sender that only needs to look at the frame: returning it would copy it, which takes longer
+/// than making it.
 ///
 /// # Errors
 /// Those of [`encode`]; `look` is not called then.
@@ -140,7 +140,7 @@ pub fn encode_with<T>(
 ///
 /// # Errors
 /// The frame is not one that [`encode`] makes; [`DecodeError`] names the first check it fails.
-// Out of line: within the loop of a caller, the compiler would prepare it even where no frame has come.
+// Out of line: inside a caller's loop, the compiler would set it up even without a frame.
 #[inline(never)]
 pub fn decode(frame: &CanFrame) -> Result<Received, DecodeError> {
     let info = table::of_frame(frame).ok_or(DecodeError::UnknownId)?;
@@ -195,7 +195,7 @@ const fn info_of(message: &Message) -> &'static MessageInfo {
     }
 }
 
-/// Writes the message to the beginning of `body`; `None` if it takes more.
+/// Writes the message to the beginning of `body`; `None` if it does not fit.
 fn write(message: &Message, body: &mut [u8]) -> Option<()> {
     fn put<T: Serialize>(value: &T, body: &mut [u8]) -> Option<()> {
         postcard::to_slice(value, body).ok().map(|_| ())
@@ -253,14 +253,14 @@ fn take<T: Serialize + DeserializeOwned>(body: &[u8]) -> Result<T, DecodeError> 
     Ok(message)
 }
 
-/// The table's ranges, applied to the bytes: the sender asks before it sends, the receiver before it believes.
+/// Applies the table's ranges to the bytes: the sender before sending, the receiver before use.
 fn check_values(message: &Message, info: &MessageInfo, body: &[u8]) -> Result<(), ValueError> {
     let in_range = match message {
         Message::Feedback(feedback) => feedback.in_range(),
         Message::Command(command) => command.in_range(),
         _ => false,
     };
-    // Of the messages of every sample, the table only has to say what is wrong.
+    // For the messages of every sample, the table is only needed to name what is wrong.
     if in_range {
         return Ok(());
     }
@@ -281,7 +281,7 @@ fn check_by_table(info: &MessageInfo, body: &[u8]) -> Result<(), ValueError> {
             Kind::F32 { min, max } => {
                 for (bytes, &(element, _)) in field.as_chunks().0.iter().zip(signal.elements) {
                     let value = f32::from_le_bytes(*bytes);
-                    // The range is finite, so what is not is not in it.
+                    // The range is finite, so it contains no infinity and no NaN.
                     if !(min..=max).contains(&value) {
                         return Err(out_of_range(signal.name, element, value, min, max));
                     }
@@ -343,7 +343,7 @@ impl fmt::Display for EncodeError {
 impl fmt::Display for DecodeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::UnknownId => f.write_str("identifier of no message"),
+            Self::UnknownId => f.write_str("unknown identifier"),
             Self::WrongKind => f.write_str("wrong frame format"),
             Self::WrongLength { found, expected } => {
                 write!(f, "{found} bytes, expected {expected}")

@@ -1,11 +1,11 @@
 //! Enumerations and bit sets that are one or two bytes on the wire.
 //!
-//! Value, name and type are written once, so that wire, message table and text cannot disagree. A byte that stands for
-//! nothing is refused when it is read: no value of these types is ever out of its set.
+//! Value, name and type are written once, so that wire, message table and text cannot disagree. A byte without meaning
+//! is refused when it is read: no value of these types is ever outside its set.
 
 use core::fmt;
 
-/// A byte that no variant of the enumeration has.
+/// A byte that is the code of no variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnknownCode(pub u8);
@@ -18,8 +18,8 @@ impl fmt::Display for UnknownCode {
 
 impl core::error::Error for UnknownCode {}
 
-/// Declares an enumeration of named bytes: `Variant = byte, "name";`, each under one line of documentation that is
-/// also what a person gets to read at run time.
+/// Declares an enumeration of named bytes: `Variant = byte, "name";`, each under one line of documentation,
+/// which is also its description at run time.
 macro_rules! codes {
     (
         $(#[$meta:meta])*

@@ -1,15 +1,15 @@
-//! Received frames that were not used, counted by cause.
+//! Received frames that were not used, by cause.
 
 use core::fmt;
 
 use crate::codec::{DecodeError, ValueError};
 use crate::e2e::Verdict;
 
-/// Counts by cause; each stays at its greatest value.
+/// Counts by cause; each saturates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
-    /// Identifier of no message.
+    /// Unknown identifier.
     pub unknown_id: u16,
     /// Wrong frame format.
     pub wrong_kind: u16,
@@ -79,11 +79,11 @@ impl Counters {
     }
 }
 
-/// The causes that occurred: `3 with a wrong CRC, 1 stale`, or `none`; a count that ran out is `>= 65535`.
+/// The causes that occurred: `3 with a wrong CRC, 1 stale`, or `none`; a saturated count is `>= 65535`.
 impl fmt::Display for Counters {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let causes = [
-            (self.unknown_id, "of unknown identifier"),
+            (self.unknown_id, "with an unknown identifier"),
             (self.wrong_kind, "of the wrong format"),
             (self.wrong_length, "of the wrong length"),
             (self.crc, "with a wrong CRC"),

@@ -2,11 +2,11 @@
 //!
 //! The bus CRC guards the wire; this one guards everything between two applications: drivers, mailboxes, gateways,
 //! memory. The CAN identifier goes into the CRC as data id without being sent again, so a frame that turns up on another
-//! identifier is refused. The CRC stands last and big-endian: only in that position does the code word keep the
-//! polynomial's guarantee that every burst up to the width of the CRC is found.
+//! identifier is refused. The CRC comes last and big-endian: only there does the code word keep the polynomial's
+//! guarantee that every burst up to the width of the CRC is found.
 //!
-//! Layout: payload, zero padding, counter, CRC. The order of the CRC's input: data id (big-endian), then the frame's
-//! bytes up to the CRC.
+//! Layout: payload, zero padding, counter, CRC. Input of the CRC: data id (big-endian), then the frame's bytes up to
+//! the CRC.
 
 use crc::{CRC_8_AUTOSAR, Crc};
 
@@ -44,7 +44,7 @@ impl Profile {
     }
 
     /// Writes the counter, reduced to its width, and the CRC over the last bytes of `frame`. A frame too short to hold
-    /// them stays as it is.
+    /// them is left unchanged.
     pub fn protect(self, data_id: u16, counter: u8, frame: &mut [u8]) {
         let counter = counter & self.counter_max();
         match self {
@@ -67,8 +67,8 @@ impl Profile {
         }
     }
 
-    /// Splits a frame into payload (with its padding) and counter byte, or `None` if the CRC is not that of the
-    /// frame and data id, or the frame too short to hold it.
+    /// Splits a frame into payload (with its padding) and counter byte, or `None` if the CRC does not match
+    /// frame and data id, or the frame is too short to hold it.
     #[must_use]
     pub fn check(self, data_id: u16, frame: &[u8]) -> Option<(&[u8], u8)> {
         let covered = match self {
@@ -93,10 +93,10 @@ fn crc8(data_id: u16, bytes: &[u8]) -> u8 {
     digest.finalize()
 }
 
-/// `CRC_16_IBM_3740`, four bytes at a step and without a table: it runs over every frame of every sample.
+/// `CRC_16_IBM_3740`, four bytes per step and without a table: it runs over every frame of every sample.
 fn crc16(data_id: u16, bytes: &[u8]) -> u16 {
     let (words, rest) = bytes.as_chunks::<4>();
-    // All ones to begin with, then the two bytes of the data id.
+    // All ones, then the two bytes of the data id.
     let mut crc = remainder_16(0xFFFF ^ u32::from(data_id));
     for word in words {
         crc = remainder_16(crc << 16 ^ u32::from_be_bytes(*word));
@@ -114,8 +114,8 @@ fn crc16(data_id: u16, bytes: &[u8]) -> u16 {
 /// Remainder of `a`·x^16 divided by P = x^16 + x^12 + x^5 + 1; bit k of a number is the coefficient of x^k.
 ///
 /// The quotient is the integral part of `a` / (1 + f) with f = x^-4 + x^-11 + x^-16. Modulo 2 that is `a` times
-/// (1 + f)(1 + f^2)(1 + f^4), as f^8 = x^-32 + ... leaves nothing of 32 bits, and squaring doubles each exponent. The
-/// remainder is what the quotient times P has below x^16, where `a`·x^16 has nothing.
+/// (1 + f)(1 + f^2)(1 + f^4), since f^8 = x^-32 + ... shifts out all 32 bits and squaring doubles each exponent. The
+/// remainder is the part of the quotient times P below x^16, where `a`·x^16 is zero.
 const fn remainder_16(a: u32) -> u32 {
     let q = a ^ a >> 4 ^ a >> 11 ^ a >> 16;
     let q = q ^ q >> 8 ^ q >> 22;
@@ -138,7 +138,7 @@ impl Sender {
     }
 }
 
-/// What the counter of a received frame says about its place in the sequence.
+/// Place of a received frame in the sequence, by its counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
@@ -149,7 +149,7 @@ pub enum Verdict {
     Fresh,
     /// New, after this many lost frames.
     Lost(u8),
-    /// The one before, again: drop it.
+    /// The previous one again: drop it.
     Duplicate,
     /// Older than the newest by this many frames: late, reordered or replayed. Drop it.
     Stale(u8),
@@ -184,12 +184,12 @@ impl Receiver {
         }
     }
 
-    /// Forgets the sequence, as after a watchdog has expired or the peer has started again.
+    /// Forgets the sequence, as when a watchdog has expired or the peer has restarted.
     pub const fn reset(&mut self) {
         self.newest = None;
     }
 
-    /// Checks the counter of a frame whose CRC is right. Only a new frame moves the sequence on.
+    /// Checks the counter of a frame whose CRC is right. Only a new frame advances the sequence.
     #[must_use]
     pub fn check(&mut self, counter: u8) -> Verdict {
         let max = self.profile.counter_max();

@@ -1,8 +1,8 @@
 //! CAN data and remote frames, classical and FD (ISO 11898-1:2015).
 //!
-//! `embedded-can` knows no FD frame, hence an own type; identifiers are `embedded-can`'s. A frame that no controller
-//! could send cannot be built: lengths are those of a data length code, only classical frames are remote, only FD
-//! frames switch the bit rate.
+//! `embedded-can` has no FD frame, hence a type of our own; identifiers are those of `embedded-can`. A frame that no
+//! controller could send cannot be built: lengths are those of a data length code, only classical frames are remote,
+//! only FD frames switch the bit rate.
 
 use core::fmt;
 
@@ -58,16 +58,16 @@ pub enum FrameKind {
     },
 }
 
-/// One frame as it stands on the bus, without the fields a controller adds (CRC, stuffing, acknowledge).
+/// One frame as on the bus, without the fields that a controller adds (CRC, stuffing, acknowledge).
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-// In this order the data stand on a word's border, and are copied by words.
+// This order aligns the data to words, so that they are copied by words.
 #[repr(C)]
 pub struct CanFrame {
-    /// Zero from the end of the data on, so that derived equality is that of the frames.
+    /// Zero past the end of the data, so that derived equality compares frames.
     buffer: [u8; FD_MAX],
     id: Id,
     kind: FrameKind,
-    /// Data bytes; of a remote frame the number asked for.
+    /// Data bytes; in a remote frame, the number requested.
     len: u8,
 }
 
@@ -102,7 +102,7 @@ impl CanFrame {
         Self::with_data(id.into(), FrameKind::Fd { brs, esi: false }, data)
     }
 
-    /// The encoder's frame, to be filled in place; its data bytes are zero. `None` if the format has no such length.
+    /// A frame with zeroed data for the encoder to fill in place. `None` if the format has no such length.
     pub(crate) fn zeroed(id: StandardId, kind: FrameKind, len: usize) -> Option<Self> {
         let longest = match kind {
             FrameKind::Classical { .. } => CLASSICAL_MAX,
@@ -126,7 +126,7 @@ impl CanFrame {
             .unwrap_or_default()
     }
 
-    /// The same frame with this error state indicator. A classical frame has none and stays as it is.
+    /// The same frame with this error state indicator. A classical frame has none and is left unchanged.
     #[must_use]
     pub fn with_esi(mut self, passive: bool) -> Self {
         if let FrameKind::Fd { esi, .. } = &mut self.kind {
@@ -173,7 +173,7 @@ impl CanFrame {
         self.id
     }
 
-    /// Identifier as a number of 11 or 29 bits; [`Self::is_extended`] tells which.
+    /// Identifier as a number of 11 or 29 bits, see [`Self::is_extended`].
     #[must_use]
     pub fn raw_id(&self) -> u32 {
         match self.id {
@@ -225,7 +225,7 @@ impl CanFrame {
         self.buffer.get(..usize::from(len)).unwrap_or_default()
     }
 
-    /// Data length code, 0 to 15 (to 8 in a classical frame).
+    /// Data length code, 0 to 15 (0 to 8 in a classical frame).
     #[must_use]
     pub const fn dlc(&self) -> u8 {
         match self.len {

@@ -1,11 +1,11 @@
-//! Hash of the message table, by which two nodes find out whether they speak the same protocol.
+//! Hash of the message table: two nodes compare it to check that they use the same protocol.
 
 use crate::e2e::Profile;
 use crate::messages::Node;
 use crate::schema::{Kind, MessageInfo, Rate, Signal};
 
-/// FNV-1a, 32 bits, of message descriptions. What does not change the meaning of bytes (documentation, Rust types) does
-/// not enter.
+/// FNV-1a, 32 bits, of message descriptions. Whatever does not change the meaning of bytes (documentation,
+/// Rust types) is left out.
 #[must_use]
 pub const fn schema(mut messages: &[&MessageInfo]) -> u32 {
     let mut hash = Fnv1a::new();
@@ -17,7 +17,7 @@ pub const fn schema(mut messages: &[&MessageInfo]) -> u32 {
 }
 
 /// FNV-1a (Fowler, Noll, Vo). Texts end with 0xFF, which UTF-8 does not contain, and lists with 0xFE, so that no two
-/// tables run into the same bytes.
+/// tables give the same bytes.
 struct Fnv1a(u32);
 
 impl Fnv1a {

@@ -1,9 +1,9 @@
-//! What is on the wire between the drive cabinet's controller, its drives and the operator, and nothing else.
+//! The wire protocol between the drive cabinet's controller, its drives and the operator.
 //!
-//! # What lives here
+//! # Contents
 //!
 //! ```text
-//! codec ----> table ----> hash          one table describes every message; codec, hash and DBC follow it
+//! codec ----> table ----> hash          one table describes every message; codec, hash and DBC derive from it
 //!   |           |
 //!   v           v
 //! messages    schema, signals           the same messages as Rust types, and as offsets, ranges and units
@@ -11,20 +11,20 @@
 //!   v
 //! codes                                 enumerations on the wire
 //!
-//! e2e, counters                         place of a frame in its sequence; what was received and refused, by cause
+//! e2e, counters                         place of a frame in its sequence; counts of refused frames, by cause
 //! frame, bus                            a CAN frame, and a controller that sends and receives without blocking
 //! wire, slcan                           bits and times of a frame; frames as lines of text
 //! ```
 //!
-//! # The way of one Feedback frame
+//! # The path of one Feedback frame
 //!
-//! The drives call [`codec::encode`]: fields of [`Feedback`](messages::Feedback) to bytes, counter and CRC behind them.
+//! The drives call [`codec::encode`]: fields of [`Feedback`](messages::Feedback) to bytes, followed by counter and CRC.
 //! The receiver takes the [`CanFrame`](frame::CanFrame) from its [`Bus`](bus::Bus) and calls [`codec::decode`], which
 //! finds the message in the [`table`] and checks length, CRC, canonical form and ranges, in this order; then
-//! [`Receiver`](e2e::Receiver) judges the counter. Only what passes both is used; the rest is counted in
-//! [`Counters`](counters::Counters) by cause and changes nothing.
+//! [`Receiver`](e2e::Receiver) judges the counter. Only frames that pass both are used; the rest are
+//! counted in [`Counters`](counters::Counters) by cause and change nothing.
 //!
-//! Nothing here allocates, panics or reads a clock, and nothing knows a robot.
+//! Nothing here allocates, panics, reads a clock or knows a robot.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -1,8 +1,8 @@
 //! The two messages of every sample, packed by hand: field after field, little-endian, without padding.
 //!
-//! The codec runs both once a sample and spends no time on what cannot be: here every bit belongs to a field and every
-//! field is taken as it stands, so two different bodies never read as one message, and what was read need not be written
-//! again to know that it has no other form. The floats are four of one kind, held against one limit.
+//! The codec runs both once per sample and skips checks that cannot fail: every bit belongs to a field and every field
+//! is taken as it is, so two different bodies never read as the same message, and there is no need to write a message
+//! again to see that it has no other form. The floats are four of one kind, checked against one limit.
 
 use crate::messages::{Command, ControlWord, DriveStatus, Feedback};
 use crate::schema::{Kind, MessageInfo};
@@ -13,7 +13,7 @@ pub(crate) trait Packed<const LEN: usize>: Sized {
     /// The message in these bytes, or `None` if a field has no such value.
     fn unpack(body: &[u8; LEN]) -> Option<Self>;
 
-    /// Fills the bytes; `None` if there are less than the fields take, which the tests of the layout rule out.
+    /// Fills the bytes; `None` if there are fewer than the fields take, which the tests of the layout rule out.
     fn pack(&self, body: &mut [u8; LEN]) -> Option<()>;
 
     /// Whether all floats are finite and in the range that the table gives them.
@@ -30,7 +30,7 @@ const _: () = assert!(COMMAND_LEN == table::COMMAND.body_len());
 const VELOCITY_MAX: f32 = magnitude(&table::FEEDBACK);
 const TORQUE_MAX: f32 = magnitude(&table::COMMAND);
 
-/// Greatest magnitude of the floats of a message that has one signal of them, with a symmetric range.
+/// Greatest magnitude of the floats of a message with a single float signal, of symmetric range.
 const fn magnitude(info: &MessageInfo) -> f32 {
     let (mut found, mut greatest) = (0, 0.0);
     let mut signals = info.signals;
@@ -46,7 +46,7 @@ const fn magnitude(info: &MessageInfo) -> f32 {
 }
 
 fn all_within(values: &[f32; 4], max: f32) -> bool {
-    // Comparison with a NaN is false.
+    // Comparison with NaN is false.
     values.iter().all(|value| value.abs() <= max)
 }
 
@@ -102,7 +102,7 @@ impl Packed<COMMAND_LEN> for Command {
     }
 }
 
-/// What is left to read. Lengths are constants where this is used: the checks are decided by the compiler.
+/// What is left to read. Lengths are constants where this is used, so the compiler resolves the checks.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {

@@ -1,14 +1,13 @@
-//! The parameter table: what can be read and written over the bus by number, and when.
+//! The parameter table: what can be read and written by number over the bus, and when.
 //!
 //! Numbers, names, units, ranges and defaults are here and nowhere else: both servers answer from it ([`serve`]),
-//! and the listing for people, `docs/parameters.md` and the comments of the DBC are made of it. A number keeps its
-//! meaning for good; new parameters get new numbers.
+//! and the command-line listing, `docs/parameters.md` and the comments of the DBC are generated from it. A number never
+//! changes its meaning; new parameters get new numbers.
 //!
-//! The controller answers the operator. Numbers from [`DRIVES`] on belong to the drives: the controller passes requests
-//! for them on, and their answers back, so that each identifier keeps its one sender.
+//! The controller answers the operator. Numbers from [`DRIVES`] on belong to the drives: the controller forwards
+//! requests for them and returns the answers, so that each identifier keeps a single sender.
 //!
-//! A new value is in force from the next sample on, for as long as its node runs; a node that starts again has its
-//! defaults again.
+//! A new value takes effect from the next sample until its node restarts; a restart restores the defaults.
 
 mod list;
 mod server;
@@ -18,7 +17,7 @@ pub use server::{Field, Listed, Store, serve};
 
 use crate::messages::{ParameterError, Server};
 
-/// First number of the drives.
+/// First parameter number of the drives.
 pub const DRIVES: u16 = 0x1000;
 
 /// When a parameter may be written.
@@ -27,14 +26,14 @@ pub enum Settable {
     /// Never: it is a reading, or fixed when the node is built.
     Never,
     /// While the arm is at rest: for the controller, without torque and fault, or enabled without a move; for the
-    /// drives, without torque. What changes torques or the timing of the brake is of this kind.
+    /// drives, without torque. Parameters that change torques or the timing of the brake are of this kind.
     AtRest,
-    /// In every state. What only decides when to stop the arm is of this kind.
+    /// In every state. Parameters that only decide when to stop the arm are of this kind.
     Always,
 }
 
 impl Settable {
-    /// As people read it.
+    /// Its text.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -45,33 +44,33 @@ impl Settable {
     }
 }
 
-/// Which values a parameter has within its range.
+/// Which values within its range a parameter can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// All.
     Real,
     /// Whole numbers.
     Whole,
-    /// A corner frequency (rad/s) of the loop: all, up to a quarter of a radian per sample. Beyond, no phase is left for
-    /// the delays of sampling and bus.
+    /// A corner frequency (rad/s) of the loop: all, up to a quarter of a radian per sample. Beyond that, no phase
+    /// margin is left for the delays of sampling and bus.
     Corner,
 }
 
 /// Bound of a [`Kind::Corner`], rad per sample.
 pub const CORNER_PER_SAMPLE: f32 = 0.25;
 
-/// What a server has to know of a parameter.
+/// What a server needs to know about a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
     /// Number on the wire.
     pub number: u16,
     /// When it may be written.
     pub settable: Settable,
-    /// Which values it has within its range.
+    /// Which values within its range it can have.
     pub kind: Kind,
     /// Least value.
     pub lower: f32,
-    /// Greatest value, at any rate of sampling.
+    /// Greatest value, at any sampling rate.
     pub upper: f32,
 }
 
@@ -80,7 +79,7 @@ impl Rule {
     #[must_use]
     pub const fn upper_at(&self, period: f32) -> f32 {
         if matches!(self.kind, Kind::Corner) {
-            // Rates are whole numbers of hertz; their periods are not, and would make 249.99998 of 250.
+            // Rates are whole numbers of hertz; their periods are inexact and would turn 250 into 249.99998.
             let rate = (1.0 / period + 0.5) as u32 as f32;
             least(self.upper, CORNER_PER_SAMPLE * rate)
         } else {
@@ -91,8 +90,8 @@ impl Rule {
     /// Accepts a value by its range alone.
     ///
     /// # Errors
-    /// The bound that it violates; for a fraction where whole numbers are allowed, the whole number below it. What is
-    /// not a number violates the lower bound.
+    /// The bound that it violates; for a fraction where whole numbers are allowed, the whole number below it. NaN
+    /// violates the lower bound.
     pub const fn check(&self, value: f32, period: f32) -> Result<(), f32> {
         let upper = self.upper_at(period);
         if value.is_nan() || value < self.lower {
@@ -108,7 +107,7 @@ impl Rule {
         Ok(())
     }
 
-    /// Accepts a value, or says why not.
+    /// Accepts a value, or returns why not.
     ///
     /// # Errors
     /// The reason, with the bound violated where it is [`ParameterError::OutOfRange`], otherwise 0.
@@ -136,8 +135,8 @@ impl Rule {
 pub struct Default {
     /// The value.
     pub most: f32,
-    /// For a corner frequency: rad per sample that it does not exceed, so that slow sampling reduces it. Infinite for what
-    /// sampling does not matter to.
+    /// For a corner frequency, its limit in rad per sample, so that slow sampling reduces it. Infinite for anything
+    /// that does not depend on sampling.
     pub per_sample: f32,
 }
 
@@ -149,7 +148,7 @@ impl Default {
     }
 }
 
-/// Of two numbers; not `f32::min`, whose care for NaN costs an image more than the rest of the test.
+/// The smaller of two numbers. `f32::min` handles NaN, which costs an image more than the rest of the check.
 const fn least(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
@@ -161,7 +160,7 @@ pub struct Parameter {
     pub rule: Rule,
     /// Name, unique among all servers: lower case with hyphens.
     pub name: &'static str,
-    /// Unit; empty for a ratio.
+    /// Unit; empty for a pure number.
     pub unit: &'static str,
     /// One sentence for a person.
     pub about: &'static str,
@@ -170,7 +169,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// Node that has it.
+    /// Node that the parameter belongs to.
     #[must_use]
     pub const fn server(&self) -> Server {
         if self.rule.number < DRIVES {

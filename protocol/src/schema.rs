@@ -1,4 +1,4 @@
-//! How a message is described.
+//! Description of a message.
 
 use crate::e2e::Profile;
 use crate::frame::{CanFrame, FrameKind, StandardId};
@@ -17,8 +17,8 @@ pub enum Kind {
     I16,
     /// Two's complement, 32 bits.
     I32,
-    /// IEEE 754 binary32, finite and within `min..=max`. The range tells sense from nonsense; the limits of the robot
-    /// are narrower and belong to the controller.
+    /// IEEE 754 binary32, finite and within `min..=max`. The range only excludes nonsense; the limits of the
+    /// robot are narrower and belong to the controller.
     F32 {
         /// Least value.
         min: f32,
@@ -29,9 +29,9 @@ pub enum Kind {
     Code(&'static [(u8, &'static str)]),
     /// One byte that selects which of the signals that follow are present (a DBC multiplexor).
     Selector(&'static [(u8, &'static str)]),
-    /// One byte of named bits from bit 0 on; those without a name are zero.
+    /// One byte of named bits, from bit 0 up; bits without a name are zero.
     Flags8(&'static [&'static str]),
-    /// Two bytes of named bits from bit 0 on; those without a name are zero.
+    /// Two bytes of named bits, from bit 0 up; bits without a name are zero.
     Flags16(&'static [&'static str]),
 }
 
@@ -47,10 +47,10 @@ impl Kind {
     }
 }
 
-/// One field of a message: a number, or several of one kind that follow each other.
+/// One field of a message: a number, or several consecutive ones of the same kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Signal {
-    /// Name, that of the field.
+    /// Name of the struct's field.
     pub name: &'static str,
     /// First byte.
     pub offset: usize,
@@ -90,11 +90,11 @@ pub enum Content {
 /// When a message is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rate {
-    /// Once a sampling period.
+    /// Once per sampling period.
     EverySample,
-    /// This often a second.
+    /// This many times per second.
     Hertz(u8),
-    /// When there is a reason.
+    /// On an event.
     Event,
 }
 
@@ -115,7 +115,7 @@ pub struct MessageInfo {
     pub len: usize,
     /// Protection; its profile also says the frame format. Without protection a message is classical.
     pub protection: Option<Profile>,
-    /// What the codec makes of it.
+    /// The message that it carries.
     pub content: Content,
     /// Fields, by offset.
     pub signals: &'static [Signal],
@@ -134,7 +134,7 @@ impl MessageInfo {
         !frame.is_extended() && frame.raw_id() == u32::from(self.id)
     }
 
-    /// A frame of this message with about half of the stuff bits there can be: alternating bits need none, equal ones
+    /// A frame of this message with about half of the possible stuff bits: alternating bits need none, equal ones
     /// the most. `None` if no frame has the message's length.
     #[must_use]
     pub fn specimen(&self) -> Option<CanFrame> {

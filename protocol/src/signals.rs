@@ -16,7 +16,7 @@ macro_rules! one {
     };
 }
 
-/// One number a motor, with this unit.
+/// One number per motor, with this unit.
 macro_rules! motors {
     ($unit:literal) => {
         &[
@@ -37,7 +37,7 @@ const JOINTS: Elements = &[
 const POSE: Elements = &[("x", "m"), ("y", "m"), ("z", "m"), ("yaw", "rad")];
 
 const ANY: Kind = range(f32::MIN, f32::MAX);
-/// More than any joint or Cartesian coordinate of a robot this size, in rad or m.
+/// Beyond any joint or Cartesian coordinate of a robot of this size, rad or m.
 const COORDINATE: Kind = range(-100.0, 100.0);
 const FRACTION: Kind = range(0.0, 1.0);
 const CAUSE: Kind = Kind::Code(Cause::CODES);

@@ -2,9 +2,9 @@
 //!
 //! One line is one command or one frame, ended by a carriage return; BEL refuses. Frames are `t` and `T` (data), `r`
 //! and `R` (remote), `d` and `D` (FD), `b` and `B` (FD with bit rate switch), small letters for 11-bit identifiers,
-//! followed by identifier (3 or 8 hex digits), data length code (1) and data. There is no place for the error state
-//! indicator: it is lost. Hex digits are written in capitals and read in either case, as the Linux driver does. Line feeds
-//! mean nothing, wherever they stand. A frame may end in a timestamp of 4 digits (ms, CAN232) or 8 (us), which is read over.
+//! followed by identifier (3 or 8 hex digits), data length code (1) and data. The error state indicator has no place
+//! and is lost. Hex digits are written in capitals and read in either case, as the Linux driver does. Line feeds
+//! are ignored everywhere. A frame may end in a timestamp of 4 digits (ms, CAN232) or 8 (us), which is skipped.
 
 mod text;
 
@@ -17,7 +17,7 @@ pub use text::Text;
 /// Longest line: letter, 29-bit identifier, length code, 64 bytes, carriage return.
 pub const MAX_LINE: usize = 1 + 8 + 1 + 2 * FD_MAX + 1;
 
-/// Longest timestamp behind a frame, digits.
+/// Longest timestamp after a frame, digits.
 const MAX_STAMP: usize = 8;
 
 /// Ends every line; alone it acknowledges.
@@ -25,11 +25,11 @@ pub const CR: u8 = b'\r';
 /// Refuses the line before it.
 pub const BEL: u8 = 0x07;
 
-/// What one line says.
+/// Content of one line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Line {
-    /// Nothing: acknowledgement from an adapter; from a host, a way to end what stood in the line before.
+    /// Nothing: from an adapter, an acknowledgement; from a host, a way to end an unfinished line.
     Empty,
     /// Refusal (BEL).
     Refused,
@@ -65,7 +65,7 @@ pub enum Line {
     AcceptanceMask(u32),
     /// `s` with register values or rates, in the dialect of the adapter: bit timing.
     Timing,
-    /// `X0` or `X1`: received frames are sent as they come, without being asked for.
+    /// `X0` or `X1`: received frames are sent as they arrive, without polling.
     AutoPoll(bool),
 }
 
@@ -75,18 +75,18 @@ pub enum Line {
 pub enum SlcanError {
     /// No command begins with this byte.
     UnknownCommand(u8),
-    /// The line is longer or shorter than the command and its length code say.
+    /// The line is longer or shorter than its command and length code require.
     WrongLength,
     /// The byte at this position, counted from 0, is not a hex digit.
     NotHex {
-        /// Place.
+        /// Position.
         at: usize,
     },
     /// The identifier has more than 11 or 29 bits.
     IdOutOfRange(u32),
-    /// The number is more than the command allows.
+    /// The number is greater than the command allows.
     OutOfRange(u8),
-    /// No line has more than [`MAX_LINE`] bytes and a timestamp.
+    /// The line is longer than [`MAX_LINE`] bytes and a timestamp.
     TooLong,
 }
 
@@ -95,9 +95,9 @@ impl fmt::Display for SlcanError {
         match self {
             Self::UnknownCommand(byte) => write!(f, "no command begins with {byte:#04x}"),
             Self::WrongLength => f.write_str("line too long or too short for its command"),
-            Self::NotHex { at } => write!(f, "no hex digit at place {at}"),
+            Self::NotHex { at } => write!(f, "not a hex digit at position {at}"),
             Self::IdOutOfRange(id) => write!(f, "identifier {id:#x} has too many bits"),
-            Self::OutOfRange(digit) => write!(f, "digit {digit} is more than the command allows"),
+            Self::OutOfRange(digit) => write!(f, "digit {digit} is greater than the command allows"),
             Self::TooLong => write!(f, "line of more than {} bytes", MAX_LINE + MAX_STAMP),
         }
     }
@@ -105,7 +105,7 @@ impl fmt::Display for SlcanError {
 
 impl core::error::Error for SlcanError {}
 
-/// Takes bytes one by one, in fixed memory, and gives lines. Any input is allowed.
+/// Turns bytes into lines, one by one and in fixed memory. Any input is allowed.
 #[derive(Clone, Debug)]
 pub struct Parser {
     line: [u8; MAX_LINE - 1 + MAX_STAMP],
@@ -129,7 +129,7 @@ impl Parser {
         }
     }
 
-    /// Takes one byte; gives what the line says when the byte ends it.
+    /// Takes one byte; returns the content of the line that the byte ends.
     pub fn push(&mut self, byte: u8) -> Option<Result<Line, SlcanError>> {
         match byte {
             CR => {
@@ -141,7 +141,7 @@ impl Parser {
                 Some(parsed)
             }
             b'\n' => None,
-            // A refusal stands alone; whatever came before it was no line.
+            // A refusal is complete by itself; anything before it was not a line.
             BEL => {
                 self.len = 0;
                 Some(Ok(Line::Refused))
@@ -169,7 +169,7 @@ fn parse(line: &[u8]) -> Result<Line, SlcanError> {
         b'O' => bare(rest, Line::Open),
         b'L' => bare(rest, Line::Listen),
         b'C' => bare(rest, Line::Close),
-        // What adapters say of a frame that they sent.
+        // The answer of some adapters to a frame that they have sent.
         b'z' | b'Z' if rest.is_empty() => Ok(Line::Empty),
         b'Z' => digit(rest, 1).map(|on| Line::Timestamps(on == 1)),
         b'X' => digit(rest, 1).map(|on| Line::AutoPoll(on == 1)),
@@ -213,7 +213,7 @@ fn digit(rest: &[u8], max: u8) -> Result<u8, SlcanError> {
     }
 }
 
-/// Number of exactly `N` hex digits, at most 8, behind the letter of the command.
+/// Number of exactly `N` hex digits, at most 8, after the letter of the command.
 fn exactly<const N: usize>(rest: &[u8]) -> Result<u32, SlcanError> {
     if rest.len() == N {
         number(rest, 1)
@@ -274,7 +274,7 @@ fn frame(command: u8, rest: &[u8]) -> Result<CanFrame, SlcanError> {
     .ok_or(SlcanError::WrongLength)
 }
 
-/// Number of at most 8 hex digits, of which the first stands at this place of the line.
+/// Number of at most 8 hex digits, the first being at this position in the line.
 fn number(digits: &[u8], at: usize) -> Result<u32, SlcanError> {
     digits
         .iter()

@@ -1,10 +1,10 @@
-//! The message table: what every identifier means, down to the byte.
+//! The message table: the meaning of every identifier, byte by byte.
 //!
-//! Codec (ranges), schema hash and DBC come from this table; the structs of [`messages`](crate::messages) are its view
-//! from Rust, and tests hold the two against each other. Every message has exactly one length and one sender per
+//! Codec (ranges), schema hash and DBC come from this table; the structs of [`messages`](crate::messages) mirror it in
+//! Rust, and tests compare the two. Every message has exactly one length and one sender per
 //! identifier.
 //!
-//! Identifiers sit on CANopen's predefined connection set (CiA 301), with the drives as node 40h, the controller as 41h
+//! Identifiers follow CANopen's predefined connection set (CiA 301), with the drives as node 40h, the controller as 41h
 //! and the operator as 42h:
 //!
 //! | identifier | CANopen | here |
@@ -18,7 +18,7 @@
 //! | 580h + n, 600h + n | SDO of server n: reply, request | parameters (own format, one frame each) |
 //! | 700h + n | heartbeat of node n: its state | the same, longer and protected |
 //!
-//! What is cyclic and urgent thereby wins arbitration over what is not.
+//! Cyclic and urgent messages thus win arbitration over the others.
 
 use crate::e2e::Profile;
 use crate::frame::{self, CanFrame, Id};
@@ -241,8 +241,8 @@ pub const fn emergency(node: Node) -> &'static MessageInfo {
     }
 }
 
-/// Hash of the whole table, computed at compile time: two nodes of one hash agree on every identifier, length, offset,
-/// type, range, unit and code.
+/// Hash of the whole table, computed at compile time: two nodes with the same hash agree on every identifier, length,
+/// offset, type, range, unit and code.
 pub const HASH: u32 = hash::schema(&TABLE);
 
 /// What every node of this version says in the handshake.
@@ -270,7 +270,7 @@ pub fn find(id: u16) -> Option<&'static MessageInfo> {
     TABLE.iter().copied().find(|info| info.id == id)
 }
 
-/// Message that a frame carries by its identifier, or `None`: no extended identifier is in the table.
+/// Message of a frame by its identifier, or `None`; the table has no extended identifiers.
 #[must_use]
 pub fn of_frame(frame: &CanFrame) -> Option<&'static MessageInfo> {
     match frame.id() {
@@ -307,7 +307,7 @@ pub const fn parameter_request(server: Server) -> &'static MessageInfo {
     }
 }
 
-/// No message can be sent that does not fit its frame, nor be mistaken for another.
+/// Every message fits its frame, and none can be mistaken for another.
 const _: () = {
     let mut messages: &[&MessageInfo] = &TABLE;
     while let [info, rest @ ..] = messages {
@@ -321,7 +321,7 @@ const _: () = {
         let mut signals = info.signals;
         while let [signal, rest @ ..] = signals {
             assert!(signal.end() <= info.body_len());
-            // The codec's test of a range refuses what is not finite only if the range is.
+            // The codec's range check refuses infinities and NaN only if the range is finite.
             if let Kind::F32 { min, max } = signal.kind {
                 assert!(min.is_finite() && max.is_finite() && min < max);
             }

@@ -1,6 +1,6 @@
 //! Time in nanoseconds: instants, durations, and the sampling period.
 //!
-//! One resolution for a controller, a bus and a plant; 64 bits of it last for centuries. Sums saturate.
+//! One resolution for controller, bus and plant; 64 bits of it last for centuries. Sums saturate.
 
 use core::ops::{Add, AddAssign, Mul};
 
@@ -31,13 +31,13 @@ impl Instant {
     /// Later than anything that happens.
     pub const MAX: Self = Self(u64::MAX);
 
-    /// So many ns after the origin.
+    /// This many ns after the origin.
     #[must_use]
     pub const fn from_nanos(ns: u64) -> Self {
         Self(ns)
     }
 
-    /// So many us after the origin.
+    /// This many us after the origin.
     #[must_use]
     pub const fn from_micros(us: u64) -> Self {
         Self(us.saturating_mul(1_000))
@@ -67,7 +67,7 @@ impl Instant {
         Duration(self.0).seconds()
     }
 
-    /// Time since `earlier`; nothing if that is later.
+    /// Time since `earlier`; zero if that is later.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Duration {
         Duration(self.0.saturating_sub(earlier.0))
@@ -80,31 +80,31 @@ impl Duration {
     /// Longer than anything takes.
     pub const MAX: Self = Self(u64::MAX);
 
-    /// So many ns.
+    /// This many ns.
     #[must_use]
     pub const fn from_nanos(ns: u64) -> Self {
         Self(ns)
     }
 
-    /// So many us.
+    /// This many us.
     #[must_use]
     pub const fn from_micros(us: u64) -> Self {
         Self(us.saturating_mul(1_000))
     }
 
-    /// So many ms.
+    /// This many ms.
     #[must_use]
     pub const fn from_millis(ms: u64) -> Self {
         Self(ms.saturating_mul(1_000_000))
     }
 
-    /// So many s.
+    /// This many s.
     #[must_use]
     pub const fn from_secs(s: u64) -> Self {
         Self(s.saturating_mul(1_000_000_000))
     }
 
-    /// So many s, cut to whole ns; nothing if negative or not a number.
+    /// This many s, truncated to whole ns; zero if negative or NaN.
     #[must_use]
     pub const fn from_seconds(s: f64) -> Self {
         // `as` saturates.
@@ -129,7 +129,7 @@ impl Duration {
         self.0 as f64 * 1e-9
     }
 
-    /// What is left after `other`; nothing if that is longer.
+    /// What is left after `other`; zero if that is longer.
     #[must_use]
     pub const fn saturating_sub(self, other: Self) -> Self {
         Self(self.0.saturating_sub(other.0))
@@ -137,7 +137,7 @@ impl Duration {
 }
 
 impl Period {
-    /// Period of `hz` samples a second, rounded to a whole ns.
+    /// Period of `hz` samples per second, rounded to a whole ns.
     #[must_use]
     pub const fn of_rate(hz: f64) -> Self {
         // `as` saturates; positive, so the half rounds to the nearest.

@@ -1,4 +1,4 @@
-//! A frame as bits on the wire: how many there are, and how long they take.
+//! A frame as bits on the wire: their number and duration.
 
 mod bits;
 mod timing;

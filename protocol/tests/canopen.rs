@@ -1,4 +1,4 @@
-//! The message table against CANopen (CiA 301) and against what needs no protection there.
+//! The message table against CANopen (CiA 301), and which messages may go without protection.
 
 use protocol::e2e::Profile;
 use protocol::messages::*;

@@ -1,4 +1,4 @@
-//! Codec: what is sent is received, and nothing else is.
+//! Codec: what is sent is received, and nothing else.
 
 mod common;
 
@@ -39,7 +39,7 @@ proptest! {
         }
     }
 
-    /// Any bits where a float stands: the sender refuses exactly what the receiver would.
+    /// Any bits in place of a float: the sender refuses exactly what the receiver would.
     #[test]
     fn sender_and_receiver_agree_on_floats(bits: u32, k in 0..4usize) {
         let mut torque = [0.0; 4];
@@ -65,7 +65,7 @@ proptest! {
         }
     }
 
-    /// The messages of every sample are not written again after reading: what is accepted must have one form without it.
+    /// The messages of every sample are not re-encoded after reading: each accepted body must be the only form anyway.
     #[test]
     fn what_is_received_every_sample_has_one_form(
         k in 0..2usize, noise in prop::collection::vec(any::<u8>(), 48), place: prop::sample::Index,
@@ -87,7 +87,7 @@ proptest! {
                 prop_assert_eq!(codec::encode(&message, counter.unwrap()), Ok(frame));
             }
         }
-        // The sets have bits to spare, and floats exponents.
+        // Reserved bits and float exponents leave this many.
         prop_assert!(accepted >= 16, "{} accepted", accepted);
     }
 
@@ -97,7 +97,7 @@ proptest! {
         let _ = codec::decode(&frame_of(id, fd, data));
     }
 
-    /// The sample says three flips of some 9 million.
+    /// Three flips in a sample of some 9 million.
     #[test]
     fn three_flips_in_feedback_are_found(message in feedback(), flips in prop::array::uniform3(0..384usize)) {
         prop_assume!(BTreeSet::from(flips).len() == 3);

@@ -1,4 +1,4 @@
-//! Codec: every frame that is wrong is refused, by its cause.
+//! Codec: every wrong frame is refused with its cause.
 
 mod common;
 
@@ -18,7 +18,7 @@ fn wrong_content_is_refused_by_cause() {
         |signal, element| DecodeError::Value(ValueError::NotFinite { signal, element });
     let heartbeat = &table::DRIVES_HEARTBEAT;
     let mut long_counter = [1, 0, 0, 0x10, 0];
-    // An 8-bit counter where 4 bits are due, under a CRC made for it.
+    // An 8-bit counter in place of 4 bits, under a matching CRC.
     long_counter[4] = common::crc8(heartbeat.id, &long_counter[..4]);
     let cases = [
         (
@@ -105,13 +105,14 @@ fn wrong_content_is_refused_by_cause() {
     for (what, frame, error) in cases {
         assert_eq!(codec::decode(&frame), Err(error), "{what}: {frame}");
     }
-    // A NaN where the selected variant has no float is padding, not a number.
+    // NaN where the selected variant has no float is nonzero padding.
     let enable = protected(&table::MOTION, &[&[0, 0][..], &nan].concat());
     assert_eq!(codec::decode(&enable), Err(NotCanonical));
 }
 
-/// A random frame of the right length passes a CRC of w bits with probability 2^-w. Binomial with mean m and this small
-/// a probability has a standard deviation of sqrt(m); three of them are allowed. The bytes are always the same ones.
+/// A random frame of the right length passes a CRC of w bits with probability 2^-w. A binomial distribution with mean m
+/// and so small a probability has a standard deviation of sqrt(m); three of them are allowed. The bytes are always the
+/// same.
 #[test]
 fn random_frames_pass_the_crc_as_often_as_chance_has_it() {
     for (info, frames, mean) in [
@@ -185,7 +186,7 @@ fn every_cause_is_counted_once() {
     assert_eq!(counters.dropped(), errors.len() as u16 + 2);
     assert_eq!(
         counters.to_string(),
-        "1 of unknown identifier, 1 of the wrong format, 1 of the wrong length, 1 with a wrong CRC, 1 malformed, \
+        "1 with an unknown identifier, 1 of the wrong format, 1 of the wrong length, 1 with a wrong CRC, 1 malformed, \
          1 not canonical, 1 not finite, 1 out of range, 1 duplicate, 1 stale, 5 lost"
     );
     for _ in 0..=u16::MAX {
@@ -194,7 +195,7 @@ fn every_cause_is_counted_once() {
     assert_eq!((counters.crc, counters.dropped()), (u16::MAX, u16::MAX));
 }
 
-/// The table says which profile each identifier has; a frame with the other one is not a message.
+/// The table says which profile each identifier has; a frame with the other one is refused.
 #[test]
 fn a_frame_moved_to_another_identifier_is_refused() {
     for node in Node::ALL {

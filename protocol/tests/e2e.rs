@@ -1,5 +1,5 @@
-//! End-to-end protection: the CRCs against the published catalogue and their definition, the error classes they
-//! promise to find, and the counter against an unbounded count.
+//! End-to-end protection: the CRCs against the published catalogue, their definition and the error classes that they
+//! guarantee to find, and the counter against an unbounded count.
 
 mod common;
 
@@ -33,7 +33,7 @@ fn frames_too_short_are_neither_written_nor_believed() {
             assert!(frame.iter().all(|&byte| byte == 0xA5));
             assert_eq!(profile.check(0x123, &frame), None);
         }
-        // Not even with the CRC of nothing in the right place.
+        // Not even with the CRC of no bytes in the right place.
         let (crc8, crc16) = (crc8(0x123, &[]), crc16(0x123, &[]));
         assert_eq!(Profile::Classical.check(0x123, &[crc8]), None);
         assert_eq!(Profile::Fd.check(0x123, &crc16.to_be_bytes()), None);
@@ -122,7 +122,7 @@ proptest! {
         prop_assert_eq!(Profile::Fd.check(other, &frame), None);
     }
 
-    /// Any CRC finds every burst up to its own width, wherever it lies: the code word stands in order of division.
+    /// Any CRC finds every burst up to its own width, wherever it is: the code word is in order of division.
     #[test]
     fn bursts_up_to_the_width_are_found(seed in 1..u64::MAX, pattern in 1..=u16::MAX, place: prop::sample::Index) {
         for (profile, width, len) in [(Profile::Classical, 8, 8usize), (Profile::Fd, 16, 48)] {
@@ -170,7 +170,7 @@ fn a_stuck_counter_never_becomes_new() {
     assert_eq!(receiver.check(10), Verdict::Fresh);
 }
 
-/// A count that stays at its greatest value says that there may have been more.
+/// A saturated count shows that there may have been more.
 #[test]
 fn a_count_that_ran_out_is_no_exact_one() {
     let mut counters = Counters::default();

@@ -1,8 +1,8 @@
-//! Faults in words, and what an emergency keeps of them.
+//! Faults as text, and how much of them an emergency keeps.
 
 use protocol::messages::{Cause, DriveStatus, Emergency, Fault, FaultAxis, KnownAnswer};
 
-/// Sentences written by hand.
+/// Expected sentences written by hand.
 #[test]
 fn a_fault_reads_as_a_sentence_with_axis_and_unit() {
     let of_axis = |cause, axis, value, limit| Fault {
@@ -65,7 +65,7 @@ fn a_fault_reads_as_a_sentence_with_axis_and_unit() {
     }
 }
 
-/// Eight bytes have no room for the axis, so that the unit stays open where it depends on it.
+/// Eight bytes have no room for the axis, so the unit is ambiguous where it depends on the axis.
 #[test]
 fn an_emergency_keeps_the_value() {
     let emergency = Emergency::new(Cause::FollowingError, 0.0021f32.to_bits());

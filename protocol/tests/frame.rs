@@ -1,4 +1,4 @@
-//! Frames: the lengths of ISO 11898-1, and that an impossible frame cannot be built.
+//! Frames have the lengths of ISO 11898-1, and an impossible frame cannot be built.
 
 use proptest::prelude::*;
 use protocol::frame::{
@@ -55,7 +55,7 @@ fn prints_as_candump_does() {
     );
 }
 
-/// A minimal foreign frame type, as a silicon driver brings one.
+/// A minimal foreign frame type, as in a chip driver.
 #[derive(Clone, PartialEq, Debug)]
 struct Driver(Id, bool, Vec<u8>);
 

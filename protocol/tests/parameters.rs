@@ -10,7 +10,7 @@ use protocol::parameters::{
     self, ControllerParameter, DriveParameter, Field, Kind, Listed, Rule, Settable, Store, serve,
 };
 
-/// A node whose values are kept in a map; the sampling period is 1 ms.
+/// A node that keeps its values in a map; the sampling period is 1 ms.
 struct Bench<P> {
     real: HashMap<u16, f32>,
     whole: HashMap<u16, u32>,
@@ -120,7 +120,7 @@ fn names_are_unique_and_numbers_are_found() {
     assert_eq!(parameters::numbered(0x0FFF), None);
 }
 
-/// What a released client knows of a number stays true: rows are added, never changed.
+/// What a released client knows about a number stays true: rows are added, never changed.
 #[test]
 fn numbers_are_frozen() {
     let frozen = "\
@@ -194,7 +194,7 @@ fn every_reply_occurs() {
         error(&mut bench, set(BANDWIDTH, 80.0)),
         (ParameterError::NotNow, 0.0)
     );
-    // What only decides when to stop may be set at any time.
+    // Parameters that only decide when to stop may be set at any time.
     assert_eq!(value(&mut bench, set(FAULT_SAMPLES, 2.0)), 2.0);
     assert_eq!(
         value(&mut bench, ParameterRequest::Get { index: BANDWIDTH }),
@@ -209,7 +209,7 @@ fn every_reply_occurs() {
     assert_eq!(serve(&mut bench, &ParameterRequest::Hello(hello)), None);
 }
 
-/// A client that asks again with the next number gets every parameter once, then [`ParameterError::NotFound`].
+/// A client that repeats the request with the next number gets every parameter once, then [`ParameterError::NotFound`].
 #[test]
 fn a_listing_is_complete() {
     let mut bench = Bench::<DriveParameter>::new();
@@ -263,7 +263,7 @@ fn keeps_its_ranges<P: Listed>(requests: &[(ParameterRequest, bool)], server: Se
             assert_eq!(parameters::numbered(index).unwrap().server(), server);
             assert!(lower <= value && value <= upper, "{request:?}: {reply:?}");
         }
-        // Every answer fits its frame, whatever was asked for.
+        // Every answer fits its frame, whatever was requested.
         protocol::codec::encode(&Message::ParameterReply(server, reply), 0).unwrap();
     }
     for rule in P::RULES {

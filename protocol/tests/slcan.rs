@@ -1,4 +1,4 @@
-//! slcan against the letter of the CAN232 manual, what python-can sends, and garbage.
+//! slcan against the CAN232 manual, the bytes of python-can, and garbage.
 
 use proptest::prelude::*;
 use protocol::frame::{CanFrame, ExtendedId, Id, StandardId};
@@ -89,7 +89,7 @@ fn lines_are_written_and_read_as_documented() {
     assert_eq!(read(longest.as_bytes()), [Ok(line)]);
 }
 
-/// The bytes python-can sends when it opens a port.
+/// The bytes that python-can sends when it opens a port.
 #[test]
 fn python_can_opens() {
     let lines = [
@@ -152,7 +152,7 @@ fn errors_say_what_is_wrong_and_the_next_line_is_read() {
     }
 }
 
-/// Adapters that stamp their frames (4 digits of ms, 8 of us), and hosts that end their lines in CR LF.
+/// Adapters that timestamp their frames (4 digits of ms, 8 of us), and hosts that end their lines with CR LF.
 #[test]
 fn timestamps_and_line_feeds_are_read_over() {
     let data = CanFrame::classical(standard(0x123), &[0xAB, 0xCD]).unwrap();
@@ -163,11 +163,11 @@ fn timestamps_and_line_feeds_are_read_over() {
     assert_eq!(read(bytes), [&[Ok(Line::Close)], &frames[..]].concat());
     assert_eq!(Text::stamped(&data, 4001).as_bytes(), b"t1232ABCD0FA1\r");
     assert_eq!(read(b"t1230000G\r"), [Err(SlcanError::NotHex { at: 8 })]);
-    // Of a frame that was sent, some adapters say z or Z instead of nothing.
+    // Some adapters answer a sent frame with z or Z instead of nothing.
     assert_eq!(read(b"z\rZ\r"), [Ok(Line::Empty), Ok(Line::Empty)]);
 }
 
-/// A reader that starts in the middle, or a sender that never ends its line, costs one line.
+/// A reader that starts in mid-line, or a sender that never ends its line, costs one line.
 #[test]
 fn a_line_without_end_is_one_error() {
     let mut bytes = vec![b'0'; 10 * 1024];
@@ -177,7 +177,7 @@ fn a_line_without_end_is_one_error() {
         read(&bytes),
         [Err(SlcanError::TooLong), Ok(Line::Frame(frame))]
     );
-    // A refusal cuts a line off: what stood before it is no longer part of the next.
+    // A refusal cuts a line off: anything before it is not part of the next.
     assert_eq!(
         read(b"t12\x07t1230\r"),
         [Ok(Line::Refused), Ok(Line::Frame(frame))]
@@ -192,7 +192,7 @@ proptest! {
         prop_assert_eq!(read(&bytes), expected);
     }
 
-    /// Whatever stands behind it as a time, the frame is the same.
+    /// Whatever its timestamp, the frame is the same.
     #[test]
     fn stamped_frames_are_read(frame in frame(), milliseconds in any::<u16>()) {
         prop_assert_eq!(read(Text::stamped(&frame, milliseconds).as_bytes()), [Ok(Line::Frame(frame))]);
@@ -206,7 +206,7 @@ proptest! {
         prop_assert_eq!(read(&bytes), [Ok(Line::Frame(frame))]);
     }
 
-    /// One answer for each line end, whatever stands between, and the parser is fit afterwards.
+    /// One result per line end, whatever comes between, and the parser works afterwards.
     #[test]
     fn garbage_does_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..2000), line in line()) {
         let ends = bytes.iter().filter(|&&byte| byte == b'\r' || byte == 0x07).count();
@@ -217,7 +217,7 @@ proptest! {
         prop_assert_eq!(read(&bytes).last().copied(), Some(Ok(line)));
     }
 
-    /// Garbage of the right letters: what is read is what would have been written.
+    /// Garbage of the right letters: whatever parses is written back the same.
     #[test]
     fn near_misses_are_read_as_what_they_are(text in "[tTrRdDbB][0-9A-F]{4,12}") {
         if let [Ok(line)] = read(format!("{text}\r").as_bytes())[..] {

@@ -1,4 +1,4 @@
-//! The message table against the structs, and against itself.
+//! The message table against the structs, and its consistency.
 
 mod common;
 
@@ -11,7 +11,7 @@ use protocol::messages::*;
 use protocol::schema::{Content, Kind, MessageInfo, Rate, Signal};
 use protocol::table::{self, TABLE};
 
-/// Values of the signals present in a frame, read by nothing but the table.
+/// Values of the signals present in a frame, read by the table alone.
 fn by_table(info: &MessageInfo, data: &[u8]) -> Vec<(&'static str, Vec<f64>)> {
     let mut selected = None;
     let mut values = Vec::new();
@@ -202,7 +202,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
     }
 }
 
-/// What the message is, by the struct.
+/// Content of the message, by the struct.
 fn content(message: &Message) -> Content {
     match *message {
         Message::Nmt(_) => Content::Nmt,
@@ -252,7 +252,7 @@ fn signals_stand_side_by_side() {
             }
             assert!(end <= info.body_len(), "{}", info.name);
         }
-        // A shorter frame would not do for the longest variant.
+        // A shorter frame would not hold the longest variant.
         let longest = info
             .signals
             .iter()

@@ -1,10 +1,10 @@
-//! Which bus: the text a person types after `--bus`.
+//! Bus addresses, as typed after `--bus`.
 
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// A bus and the way to it: `socketcan:can0`, `slcan:/dev/ttyACM0`, `slcan:tcp:HOST:PORT` or
+/// Address of a bus: `socketcan:can0`, `slcan:/dev/ttyACM0`, `slcan:tcp:HOST:PORT` or
 /// `slcan:listen:HOST:PORT`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LinkAddress {

@@ -1,16 +1,16 @@
-//! Why a link cannot be used, with what to do about it.
+//! Why a link cannot be used, and what to do about it.
 
 use std::fmt;
 use std::io;
 
-/// Why a link cannot be used, or not any more.
+/// Why a link cannot be used, or has failed.
 #[derive(Debug)]
 pub enum LinkError {
     /// The system has no such network interface.
     NoInterface {
-        /// Name asked for.
+        /// The name requested.
         name: String,
-        /// CAN interfaces there are, separated by blanks.
+        /// The CAN interfaces of this machine, separated by blanks.
         present: String,
     },
     /// The network interface is not a CAN interface.
@@ -30,16 +30,16 @@ pub enum LinkError {
         /// Name.
         name: String,
     },
-    /// The other end of the serial line has gone.
+    /// The other end of the serial line is gone.
     Closed {
         /// Terminal or TCP address.
         peer: String,
     },
     /// The operating system refused something else.
     Io {
-        /// What was attempted, on what.
+        /// The operation, and what it was attempted on.
         what: String,
-        /// Its answer.
+        /// Error of the operating system.
         source: io::Error,
     },
 }

@@ -1,17 +1,17 @@
 //! Ends of a CAN bus on a Linux host: SocketCAN and serial-line adapters (slcan).
 //!
-//! # What lives here
+//! # Contents
 //!
-//! A [`Link`] is a [`Bus`] that can also be waited for. A person names one as text, a [`LinkAddress`]; behind it is
-//! [`SocketCan`], an [`SlcanPort`] (one serial line or TCP connection) or an [`SlcanHub`] (a server of many). [`realtime`]
-//! has what a process in real time asks of Linux: priority, locked memory, a sleep until an instant.
+//! A [`Link`] is a [`Bus`] with a blocking wait. Its text form is a [`LinkAddress`]; the link itself is a
+//! [`SocketCan`], an [`SlcanPort`] (one serial line or TCP connection) or an [`SlcanHub`] (a server of many).
+//! [`realtime`] has what a real-time process needs of Linux: priority, locked memory, a sleep until an instant.
 //!
-//! The crate leans on [`protocol`] alone; what frames mean is not its business. The controller's process and the
-//! simulator's external controllers, monitor and player call it.
+//! The crate depends on [`protocol`] alone and knows nothing of what frames mean. The controller's process and the
+//! simulator's external controllers, monitor and player use it.
 //!
-//! # The way of one Feedback frame
+//! # The path of one Feedback frame
 //!
-//! A frame that arrives on vcan0 is read by [`SocketCan`], stamped by the kernel ([`Stamped`]), and taken by the
+//! A frame that arrives on vcan0 is timestamped by the kernel, read by [`SocketCan`] ([`Stamped`]) and taken by the
 //! controller's process through [`Bus::receive`]; the Command goes out through [`Transmit::transmit`].
 
 #![forbid(unsafe_code)]
@@ -47,12 +47,12 @@ pub enum Link {
     SocketCan(SocketCan),
     /// A serial line.
     Slcan(Box<SlcanPort>),
-    /// The serial lines of all that connect.
+    /// The serial lines of all clients.
     SlcanHub(SlcanHub),
 }
 
 impl Link {
-    /// Opens the link and takes part in its bus. A node's own frames are never received.
+    /// Opens the link and joins its bus. A node's own frames are never received.
     ///
     /// # Errors
     /// See [`LinkError`].
@@ -68,11 +68,11 @@ impl Link {
         }
     }
 
-    /// Waits until a frame may be taken or `timeout` is over; `true` if there is something to take. A signal ends the
-    /// wait early, as if the time were over.
+    /// Waits until a frame can be taken or `timeout` has passed; `true` if there is a frame. A signal ends the wait
+    /// early, like a timeout.
     ///
     /// # Errors
-    /// The link has failed and will not carry frames any more; open it again.
+    /// The link has failed and carries no more frames; open it again.
     pub fn wait(&mut self, timeout: Duration) -> Result<bool, LinkError> {
         if let Some(failure) = self.take_failure() {
             return Err(failure);
@@ -94,8 +94,8 @@ impl Link {
         }
     }
 
-    /// Bytes of frames taken by [`transmit`](Transmit::transmit) that this process still holds; what is left when the link is
-    /// dropped is never sent. They go out while the link is waited for.
+    /// Bytes of frames accepted by [`transmit`](Transmit::transmit) that this process still holds. They are sent during
+    /// [`wait`](Self::wait); what is left when the link is dropped is never sent.
     #[must_use]
     pub fn unsent(&self) -> usize {
         match self {
@@ -131,7 +131,7 @@ impl Transmit for Link {
     }
 }
 
-/// Waits for input on a descriptor, and for room for output if asked to.
+/// Waits for input on a descriptor, and for room for output if `output`.
 fn poll_for(descriptor: impl AsFd, output: bool, timeout: Duration) -> io::Result<bool> {
     let mut events = PollFlags::IN;
     if output {

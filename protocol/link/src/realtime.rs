@@ -1,4 +1,4 @@
-//! What the operating system can do for a thread with deadlines.
+//! What the operating system offers a thread with deadlines.
 
 use std::io;
 use std::time::Duration;
@@ -12,14 +12,13 @@ use thread_priority::unix::{
 };
 use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
-/// Priority among the real-time threads: above ordinary interrupt threads (50) a busy loop could starve the drivers it
-/// waits for.
+/// Real-time priority, below the interrupt threads (50): above them a busy loop could starve the drivers it waits for.
 const PRIORITY: u8 = 49;
 
-/// Asks for `SCHED_FIFO` and locked memory for the calling thread. What is not permitted is left out: the loop then runs
-/// as any other program does, only later at times.
+/// Requests `SCHED_FIFO` and locked memory for the calling thread. Whatever is not permitted is skipped: the loop then
+/// runs like any other program, at times late.
 ///
-/// Returns one sentence for each thing that was refused.
+/// Returns one sentence per refused request.
 #[must_use]
 pub fn claim() -> Vec<String> {
     let mut refused = Vec::new();
@@ -57,8 +56,8 @@ pub fn monotonic() -> Duration {
     Duration::try_from(clock_gettime(ClockId::Monotonic)).unwrap_or_default()
 }
 
-/// Sleeps until [`monotonic`] reaches `deadline`. An absolute deadline does not drift by the time that the work before
-/// it took; one that has passed returns at once.
+/// Sleeps until [`monotonic`] reaches `deadline`. An absolute deadline does not drift with the duration of the
+/// preceding work; one that has passed returns at once.
 pub fn sleep_until(deadline: Duration) {
     let Ok(deadline) = Timespec::try_from(deadline) else {
         return;

@@ -1,9 +1,9 @@
-//! A bus of serial lines: a TCP server that each client takes for an adapter ([`slcan`](protocol::slcan)).
+//! A bus of serial lines: a TCP server that looks like an adapter ([`slcan`](protocol::slcan)) to each client.
 //!
-//! What one client sends, every other one and this node receive. It needs no CAN in the kernel, so it is the way to two
-//! processes, or to a program such as python-can, on any machine. It has no bit timing and no arbitration. A client that
-//! sends faster than the frames are taken, or than it reads its answers, is read no further until they are: memory is
-//! bounded, and TCP holds the client back.
+//! Frames of one client go to every other client and to this node. It needs no CAN in the kernel and so connects two
+//! processes, or a program such as python-can, on any machine. It has no bit timing and no arbitration. The hub stops
+//! reading a client that sends faster than its frames are taken or than it reads its answers: memory is bounded, and
+//! TCP holds the client back.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -17,27 +17,28 @@ use protocol::bus::TransmitError;
 use protocol::frame::CanFrame;
 use protocol::slcan::{Line, MAX_LINE, Parser, SlcanError, Text};
 
-/// Most clients; more are turned away.
+/// Most clients; more are refused.
 const CLIENTS: usize = 16;
-/// Bytes that may wait for a client. One that does not read loses frames, as on a real bus; the others do not notice.
+/// Bytes that may wait for a client. One that does not read loses frames, as on a real bus, without affecting the
+/// others.
 const QUEUE: usize = 4096 * MAX_LINE;
-/// Frames that may wait for this node; a buffer of each client more, and no client is read.
+/// Frames that may wait for this node, give or take one buffer per client; with more, no client is read.
 const RECEIVED: usize = 4096;
 /// Hardware and software version reported to clients.
 const VERSION: Line = Line::VersionIs([0x10, 0x10]);
 /// Serial number reported to clients.
 const SERIAL_NUMBER: Line = Line::SerialNumberIs(*b"0001");
-/// Milliseconds after which timestamps begin again (CAN232).
+/// Milliseconds after which timestamps wrap (CAN232).
 const MINUTE: u128 = 60_000;
 
 /// How a client takes part in the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
-    /// Not, as before `O` or `L` and after `C`.
+    /// Not at all, as before `O` or `L` and after `C`.
     Closed,
-    /// Listening only.
+    /// Receiving only.
     Listening,
-    /// Listening and sending.
+    /// Receiving and sending.
     Open,
 }
 
@@ -47,7 +48,7 @@ struct Client {
     parser: Parser,
     output: VecDeque<u8>,
     part: Part,
-    /// Frames go to it with the time behind.
+    /// Frames sent to it carry a timestamp.
     stamps: bool,
     gone: bool,
 }
@@ -75,7 +76,7 @@ impl SlcanHub {
     /// Listens on `HOST:PORT`.
     ///
     /// # Errors
-    /// The port is taken or not this machine's.
+    /// The port is in use, or the address is not one of this machine.
     pub fn bind(server: &str, may: Clients) -> Result<Self, LinkError> {
         let listener = TcpListener::bind(server)
             .and_then(|listener| {
@@ -92,7 +93,7 @@ impl SlcanHub {
         })
     }
 
-    /// Where it listens: the port that was given when 0 was asked for.
+    /// Local address, with the port assigned when 0 was requested.
     ///
     /// # Errors
     /// Those of the operating system.
@@ -116,12 +117,12 @@ impl SlcanHub {
 
     /// Moves bytes both ways and accepts new clients, without waiting.
     pub fn exchange(&mut self) {
-        // No more at once than there may be: a flood of callers must not keep the bus waiting.
+        // No more at once than clients are allowed: a flood of connections must not stall the bus.
         for _ in 0..CLIENTS {
             let Ok((stream, _)) = self.listener.accept() else {
                 break;
             };
-            // Small lines must not wait for each other. A client that cannot be configured is refused.
+            // Short lines must not be held back and sent together. A client that cannot be configured is refused.
             if self.clients.len() < CLIENTS
                 && stream.set_nonblocking(true).is_ok()
                 && stream.set_nodelay(true).is_ok()
@@ -182,7 +183,7 @@ impl SlcanHub {
         Ok(!self.received.is_empty())
     }
 
-    /// Of what the last exchange brought: who empties the queue comes to an end, however fast clients send.
+    /// The oldest frame of the last exchange. A caller that empties the queue finishes, however fast clients send.
     pub(super) fn take(&mut self) -> Option<Stamped> {
         self.received.pop_front()
     }
@@ -190,7 +191,7 @@ impl SlcanHub {
     /// Sends to every client that takes part.
     ///
     /// # Errors
-    /// None: a bus without listeners takes frames as well.
+    /// None: a bus without listeners accepts frames too.
     pub fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
         self.spread(frame, None);
         for client in &mut self.clients {
@@ -220,12 +221,12 @@ impl SlcanHub {
 }
 
 impl Client {
-    /// Whether it may be read: its answers have a place to wait in.
+    /// Whether it may be read: there is room for its answers.
     fn has_room(&self) -> bool {
         self.output.len() < QUEUE
     }
 
-    /// Reads one buffer, so that every client gets its turn.
+    /// Reads one buffer at most, so that every client gets its turn.
     fn read(&mut self, may: Clients, mut frame: impl FnMut(CanFrame)) {
         if !self.has_room() {
             return;
@@ -244,7 +245,7 @@ impl Client {
         }
     }
 
-    /// Does what a line says, as an adapter would.
+    /// Executes a line as an adapter would.
     fn answer(
         &mut self,
         line: Result<Line, SlcanError>,
@@ -263,8 +264,8 @@ impl Client {
                 self.stamps = on;
                 Line::Empty
             }
-            // The bit rates are not of this bus, and nobody is to be kept away by them. A filter is accepted where it lets
-            // everything pass (then its code means nothing), and frames come without being asked for.
+            // This bus has no bit rates, so any are accepted. A filter is accepted if it lets everything pass (its code
+            // then means nothing), and frames are always sent without polling.
             Ok(
                 Line::Empty
                 | Line::Bitrate(_)

@@ -17,14 +17,14 @@ use protocol::bus::TransmitError;
 use protocol::frame::CanFrame;
 use protocol::slcan::{Line, MAX_LINE, Parser, Text};
 
-/// Bytes that may wait for the line: some 30 of the longest frames. More, and the bus is slower than its senders.
+/// Bytes that may wait for the line: some 30 of the longest frames. If more wait, the bus is slower than its senders.
 const QUEUE: usize = 32 * MAX_LINE;
 /// Frames that may wait for this node; with more, the line is read no further.
 const RECEIVED: usize = 4096;
 /// Longest wait for a TCP server.
 const CONNECT_LIMIT: Duration = Duration::from_secs(3);
 
-/// What opens an adapter: 1 and 5 Mbit/s, no timestamps. The empty line first ends whatever a program before this one left
+/// Opens an adapter: 1 and 5 Mbit/s, no timestamps. The empty line first ends whatever a previous program left
 /// unfinished.
 const OPENING: [Line; 6] = [
     Line::Empty,
@@ -68,9 +68,9 @@ impl AsFd for Port {
 
 /// An open adapter. The bus behind it runs at 1 Mbit/s nominal and 5 Mbit/s data bit rate.
 ///
-/// Acknowledgements of single frames are not waited for: an adapter that refuses a frame says so by BEL, which is
-/// counted ([`Self::refused`]). So are lines that cannot be read; when the link is closed, standard error says how many
-/// there were, since they are frames that nobody has seen.
+/// Acknowledgements of single frames are not waited for: an adapter refuses a frame by BEL, which is counted
+/// ([`Self::refused`]). Unreadable lines are counted too, and reported on standard error when the link is closed, since
+/// frames among them are lost.
 #[derive(Debug)]
 pub struct SlcanPort {
     port: Port,
@@ -78,7 +78,7 @@ pub struct SlcanPort {
     parser: Parser,
     received: VecDeque<Stamped>,
     output: VecDeque<u8>,
-    /// Answers to the opening that are still due: what an adapter does not know of it, it may refuse.
+    /// Answers to the opening still expected: an adapter may refuse the commands that it does not know.
     opening: usize,
     refused: u64,
     unreadable: u64,
@@ -86,7 +86,7 @@ pub struct SlcanPort {
 }
 
 impl SlcanPort {
-    /// Opens the line and, with it, the bus of the adapter at its other end.
+    /// Opens the line and the bus of the adapter at its other end.
     ///
     /// # Errors
     /// The line cannot be opened; the adapter's answers are not waited for.
@@ -114,13 +114,13 @@ impl SlcanPort {
         Ok(link)
     }
 
-    /// Frames that the adapter has refused.
+    /// Number of frames refused by the adapter.
     #[must_use]
     pub fn refused(&self) -> u64 {
         self.refused
     }
 
-    /// Lines of the adapter that could not be read.
+    /// Number of unreadable lines from the adapter.
     #[must_use]
     pub fn unreadable(&self) -> u64 {
         self.unreadable
@@ -164,7 +164,7 @@ impl SlcanPort {
         Ok(())
     }
 
-    /// Moves bytes both ways as far as they go without waiting.
+    /// Moves bytes both ways as far as possible without waiting.
     fn exchange(&mut self) {
         self.flush();
         if self.received.len() >= RECEIVED {
@@ -172,7 +172,7 @@ impl SlcanPort {
         }
         let mut buffer = [0; 4096];
         match self.port.read(&mut buffer) {
-            // End of file: a TCP peer has gone, a terminal hung up.
+            // End of file: a TCP peer is gone, or a terminal hung up.
             Ok(0) => self.fail_closed(),
             Ok(count) => {
                 let at = SystemTime::now();
@@ -217,7 +217,7 @@ impl SlcanPort {
         match error.kind() {
             WouldBlock | Interrupted => {}
             ConnectionReset | BrokenPipe => self.fail_closed(),
-            // A terminal whose other end has gone (unplugged, pseudo-terminal closed) answers with EIO.
+            // A terminal without its other end (unplugged, pseudo-terminal closed) returns EIO.
             _ if error.raw_os_error() == Some(rustix::io::Errno::IO.raw_os_error()) => {
                 self.fail_closed();
             }
@@ -230,14 +230,15 @@ impl Drop for SlcanPort {
     fn drop(&mut self) {
         if self.unreadable > 0 {
             eprintln!(
-                "slcan:{}: {} lines of the adapter could not be read; frames among them are lost",
+                "slcan:{}: {} lines from the adapter could not be read; any frames among them are lost",
                 self.peer, self.unreadable
             );
         }
     }
 }
 
-/// Opens a terminal without line editing. Its speed stays: USB adapters have none, others were set up by `stty`.
+/// Opens a terminal without line editing. Its speed is left alone: USB adapters have none, and others are set up with
+/// `stty`.
 fn open_terminal(path: &Path) -> io::Result<File> {
     let flags = OFlags::NOCTTY | OFlags::NONBLOCK;
     let file = OpenOptions::new()
@@ -256,7 +257,7 @@ fn connect(server: &str) -> io::Result<TcpStream> {
     for address in server.to_socket_addrs()? {
         match TcpStream::connect_timeout(&address, CONNECT_LIMIT) {
             Ok(stream) => {
-                // Small lines must not wait for each other.
+                // Short lines must not be held back and sent together.
                 stream.set_nodelay(true)?;
                 stream.set_nonblocking(true)?;
                 return Ok(stream);

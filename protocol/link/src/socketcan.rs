@@ -1,4 +1,4 @@
-//! SocketCAN: any CAN interface of Linux, virtual or hardware, by one code.
+//! SocketCAN: any CAN interface of Linux, virtual or hardware.
 
 use std::fs;
 use std::io;
@@ -13,18 +13,18 @@ use super::{LinkError, Stamped, poll_for};
 use protocol::bus::TransmitError;
 use protocol::frame::{CanFrame, FrameKind};
 
-/// `ARPHRD_CAN`: kind of network interface, as `/sys/class/net/NAME/type` has it.
+/// `ARPHRD_CAN`: kind of network interface, from `/sys/class/net/NAME/type`.
 const ARPHRD_CAN: u32 = 280;
 /// `IFF_UP`: the interface is administratively up.
 const IFF_UP: u32 = 1;
 /// `CANFD_MTU`: an interface with less carries classical frames only.
 const CANFD_MTU: u32 = 72;
-/// Error classes that say whether the controller takes part in the bus (`linux/can/error.h`).
+/// Error classes that report whether the controller takes part in the bus (`linux/can/error.h`).
 const CAN_ERR_BUSOFF: u32 = 0x40;
 const CAN_ERR_RESTARTED: u32 = 0x100;
 
-/// A socket on a CAN interface. Local loopback stays on, so that other programs of this machine see what it sends; its
-/// own frames do not come back.
+/// A socket on a CAN interface. Local loopback stays on, so that other programs on this machine see its frames; it
+/// does not receive its own.
 #[derive(Debug)]
 pub struct SocketCan {
     socket: CanFdSocket,
@@ -37,7 +37,7 @@ impl SocketCan {
     /// Opens an interface that is up and carries FD frames.
     ///
     /// # Errors
-    /// There is none, it is down, or it cannot carry FD frames: [`LinkError`] says what to do.
+    /// The interface is missing, down, or cannot carry FD frames: [`LinkError`] says what to do.
     pub fn open(interface: &str) -> Result<Self, LinkError> {
         let name = || interface.to_string();
         let Some(kind) = property(interface, "type") else {
@@ -118,15 +118,15 @@ impl SocketCan {
         match written {
             Some(Ok(())) => Ok(()),
             Some(Err(error)) => Err(self.classify(&error, "write to")),
-            // Every CanFrame has an equal there.
+            // Every CanFrame has an equivalent there.
             None => Err(TransmitError::Offline),
         }
     }
 
-    /// What an error of the socket means for a sender; one that ends the link is kept.
+    /// The transmit error for an error of the socket; one that ends the link is kept.
     fn classify(&mut self, error: &io::Error, what: &str) -> TransmitError {
         match error.raw_os_error().map(Errno::from_raw_os_error) {
-            // Queue of the interface, buffer of the socket: full is full.
+            // Either the queue of the interface or the buffer of the socket is full.
             Some(Errno::NOBUFS | Errno::AGAIN) => TransmitError::QueueFull,
             Some(Errno::INTR) => TransmitError::QueueFull,
             Some(Errno::NETDOWN) => {
@@ -171,7 +171,7 @@ fn from_socketcan(frame: &CanAnyFrame) -> Option<CanFrame> {
     }
 }
 
-/// A number that the kernel tells about an interface, decimal or hexadecimal.
+/// A numeric property of an interface, decimal or hexadecimal.
 fn property(interface: &str, name: &str) -> Option<u32> {
     let text = fs::read_to_string(format!("/sys/class/net/{interface}/{name}")).ok()?;
     let text = text.trim();

@@ -4,7 +4,7 @@ use std::time::SystemTime;
 
 use protocol::frame::CanFrame;
 
-/// A frame and when it came.
+/// A frame and its time of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamped {
     /// The frame.

@@ -1,4 +1,4 @@
-//! Addresses of links, and the serial link against a peer that answers by hand. SocketCAN needs a kernel with CAN:
+//! Addresses of links, and the serial link against a scripted peer. SocketCAN needs a kernel with CAN:
 //! `tests/ci/10-vcan.sh`.
 
 use std::io::{Read, Write};
@@ -93,7 +93,7 @@ fn serial_link_opens_its_adapter_and_carries_frames_both_ways() {
 
     // Acknowledgements, a refusal and noise around two frames, the second in two pieces.
     assert_eq!(link.receive(), None);
-    // The six lines of the opening are answered first, one of them by a refusal: the adapter knows no Z0.
+    // The six lines of the opening are answered first, one by a refusal: the adapter does not know Z0.
     peer.write_all(b"\r\r\r\r\x07\r\rz\r\x07garbage\rt240211220FA1\r\nb1C0")
         .unwrap();
     assert!(link.wait(LIMIT).unwrap());
@@ -158,7 +158,7 @@ fn what_one_client_of_a_hub_sends_all_others_receive_and_nobody_twice() {
     for link in &mut links {
         link.transmit(&frame(7)).unwrap();
     }
-    // Once the hub has a client's frame it has its opening, and all three hear the next frame.
+    // Once the hub has a client's frame it also has its opening, and all three receive the next frame.
     let mut link = Link::SlcanHub(hub);
     for _ in 0..3 {
         while !link.wait(LIMIT).unwrap() {}
@@ -176,7 +176,7 @@ fn what_one_client_of_a_hub_sends_all_others_receive_and_nobody_twice() {
     assert_eq!(carried(&mut hub, second), frame(8));
     assert_eq!(carried(&mut hub, third), frame(8));
     hub.transmit(&frame(9)).unwrap();
-    // The sender's own frame did not come back: the next that it hears is the hub's.
+    // The sender's own frame did not come back: the next one it receives is the hub's.
     assert_eq!(carried(&mut hub, first), frame(9));
 }
 
@@ -187,7 +187,7 @@ fn a_hub_to_watch_refuses_frames_and_answers_like_an_adapter() {
         unreachable!("made so");
     };
     let mut peer = TcpStream::connect(server).unwrap();
-    // As python-can opens a bus; then what other programs ask, with line ends of theirs.
+    // As python-can opens a bus; then the queries of other programs, with their line ends.
     peer.write_all(b"C\rS8\r\rO\rV\rN\rF\rt1230\r?\r").unwrap();
     peer.write_all(b"Z0\r\nM00000000\r\nmFFFFFFFF\r\nm00000000\r\ns031C\r\nX1\r\nX0\r\n")
         .unwrap();
@@ -205,7 +205,7 @@ fn a_hub_to_watch_refuses_frames_and_answers_like_an_adapter() {
     assert_eq!(answer, expected);
 }
 
-/// What a client hears until `expected` has come.
+/// Checks that what a client receives is `expected`.
 fn heard(hub: &mut SlcanHub, peer: &mut TcpStream, expected: &[u8]) {
     peer.set_nonblocking(true).unwrap();
     let mut answer: Vec<u8> = Vec::new();
@@ -238,7 +238,7 @@ fn a_client_that_listens_only_cannot_send() {
     heard(&mut hub, &mut other, b"\r");
     listener.write_all(b"L\rt0010\rO\rt0020\r").unwrap();
     heard(&mut hub, &mut listener, b"\r\x07\r\r");
-    // Of the two, only the frame of the open channel is spread.
+    // Only the frame of the open channel is forwarded.
     heard(&mut hub, &mut other, b"t0020\r");
     let mut link = Link::SlcanHub(hub);
     let frame = CanFrame::classical(StandardId::new(2).unwrap(), &[]).unwrap();
@@ -264,7 +264,7 @@ fn clients_come_and_go_while_others_listen_and_get_timestamps_if_they_ask() {
     assert!(stamped.starts_with(b"t1231AB") && stamped.ends_with(b"\r"));
     let milliseconds = std::str::from_utf8(&stamped[7..11]).unwrap();
     assert!(u16::from_str_radix(milliseconds, 16).unwrap() < 60_000);
-    // Closed, it hears nothing but its answer, and the other goes on.
+    // Once closed it receives nothing but its answer, and the other continues.
     first.write_all(b"C\r").unwrap();
     heard(&mut hub, &mut first, b"\r");
     hub.transmit(&frame).unwrap();
@@ -278,7 +278,7 @@ fn clients_come_and_go_while_others_listen_and_get_timestamps_if_they_ask() {
     }
 }
 
-/// A client that sends as fast as it can, and reads no answer: it is held back, and the node always comes to an end.
+/// A client that sends as fast as it can and reads no answers is held back, and the node can always drain its queue.
 #[test]
 fn a_flood_is_held_back() {
     for may in [Clients::TakePart, Clients::Watch] {
@@ -290,7 +290,7 @@ fn a_flood_is_held_back() {
         let mut link = Link::SlcanHub(hub);
         let mut sent = 0;
         let mut stalled = 0;
-        // Nobody takes a frame or reads an answer: some buffers are filled, then nothing more goes.
+        // Nobody takes a frame or reads an answer: some buffers fill up, then sending stalls.
         while stalled < 200 {
             match flood.write(&lines) {
                 Ok(count) => (sent, stalled) = (sent + count, 0),

@@ -5,7 +5,7 @@ use crate::e2e::Sender;
 use crate::frame::CanFrame;
 use crate::messages::{Message, Server};
 
-/// Makes the frames of one node, with a counter for each of its identifiers.
+/// Makes the frames of one node, with a counter per identifier.
 #[derive(Clone, Debug, Default)]
 pub struct Encoder {
     feedback: Sender,
@@ -28,7 +28,8 @@ impl Encoder {
         self.encode_with(message, |frame| *frame)
     }
 
-    /// As [`Encoder::encode`], for a sender that only looks at the frame, as [`encode_with`](super::encode_with) is.
+    /// Like [`Encoder::encode`], for a sender that only needs to look at the frame, see
+    /// [`encode_with`](super::encode_with).
     ///
     /// # Errors
     /// Those of [`encode`](super::encode); `look` is not called then.
@@ -38,7 +39,7 @@ impl Encoder {
         look: impl FnOnce(&CanFrame) -> T,
     ) -> Result<T, EncodeError> {
         let sender = match message {
-            // These have no counter of the encoder's.
+            // These carry no counter of the encoder.
             Message::Nmt(_) | Message::EStop(_) | Message::Emergency(..) => &mut Sender::default(),
             Message::Feedback(_) => &mut self.feedback,
             Message::Command(_) => &mut self.command,

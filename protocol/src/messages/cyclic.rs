@@ -1,4 +1,4 @@
-//! Messages that come with the sampling clock, and the controller's report.
+//! Messages of every sample, and the controller's report.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,19 +24,19 @@ pub struct Feedback {
 bits! {
     /// What the drives report about themselves.
     pub struct DriveStatus: u8 {
-        /// Powered, no fault, would take torque.
+        /// Powered, no fault, ready for torque.
         READY = 0, "ready";
         /// Power stage on.
         TORQUE_ON = 1, "torque-on";
         /// Holding brake of the lift released.
         BRAKE_RELEASED = 2, "brake-released";
-        /// At least one motor could not give the torque asked for.
+        /// At least one motor could not give the commanded torque.
         TORQUE_SATURATED = 3, "torque-saturated";
         /// Emergency stop input active.
         ESTOP_INPUT = 4, "estop-input";
         /// A drive is in fault.
         FAULT = 5, "fault";
-        /// Positions are those of the encoders, and referenced.
+        /// Positions come from the encoders and are referenced.
         ENCODER_VALID = 6, "encoder-valid";
     }
 }
@@ -45,7 +45,7 @@ bits! {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Command {
-    /// Sample of the feedback that this answers.
+    /// Sample number of the feedback that this answers.
     pub sample: u32,
     /// Switch commands for the drives.
     pub control: ControlWord,
@@ -56,7 +56,7 @@ pub struct Command {
 bits! {
     /// Switch commands for the drives.
     pub struct ControlWord: u8 {
-        /// Power stage on; without it the motors are free of torque whatever is asked for.
+        /// Power stage on; without it the motors give no torque, whatever is commanded.
         TORQUE_ENABLE = 0, "torque-enable";
         /// Release the holding brake of the lift.
         BRAKE_RELEASE = 1, "brake-release";
@@ -67,7 +67,7 @@ bits! {
     }
 }
 
-/// Controller to all, 50 Hz: how the cabinet is.
+/// Controller to all, 50 Hz: report of the cabinet.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct State {
@@ -79,12 +79,12 @@ pub struct State {
     pub limits: LimitFlags,
     /// Motions accepted and not yet completed.
     pub queue: u8,
-    /// Sequence number of the motion completed last.
+    /// Sequence number of the last motion completed.
     pub completed: u8,
-    /// Samples that took longer than the sampling period; stays at its greatest value.
+    /// Samples that took longer than the sampling period; saturates.
     #[serde(with = "postcard::fixint::le")]
     pub overruns: u16,
-    /// Frames dropped, by decoding or for their counter; stays at its greatest value.
+    /// Frames dropped by decoding or for their counter; saturates.
     #[serde(with = "postcard::fixint::le")]
     pub rejected: u16,
     /// Most expensive sample so far in the board's cycle unit; 0 if it has no cycle counter.
@@ -96,12 +96,12 @@ pub struct State {
     pub compensation: Compensation,
     /// Reference minus measurement, joint units (rad, rad, m, rad).
     pub tracking_error: [f32; 4],
-    /// Axis of the latched fault. This field and those after it came later and lie in what was padding: 0 in frames of
-    /// older nodes.
+    /// Axis of the latched fault. This field and those after it were added later in place of padding: 0 in frames
+    /// of older nodes.
     pub fault_axis: FaultAxis,
     /// Value that led to the latched fault, in the unit of [`Fault::unit`].
     pub fault_value: f32,
-    /// What is allowed instead, in the same unit; 0 if that is not a number.
+    /// Limit, in the same unit; 0 if the cause has none.
     pub fault_limit: f32,
 }
 

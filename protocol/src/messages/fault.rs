@@ -1,4 +1,4 @@
-//! A fault with its axis and number, and how a person reads it.
+//! A fault with its axis and number, and its text.
 
 use core::fmt::{self, Write};
 
@@ -26,7 +26,7 @@ codes! {
     pub enum KnownAnswer {
         /// Sine and cosine of an angle.
         Sine = 1, "sine";
-        /// Pose of a joint position, and the way back.
+        /// Pose of a joint position, and its inverse.
         Kinematics = 2, "kinematics";
         /// Check values of the end-to-end CRCs.
         Crc = 3, "crc";
@@ -41,11 +41,11 @@ codes! {
 pub struct Fault {
     /// What is wrong.
     pub cause: Cause,
-    /// Where, if one axis is concerned.
+    /// Axis concerned, if it is a single one.
     pub axis: FaultAxis,
-    /// What was found, in [`Fault::unit`].
+    /// Value found, in [`Fault::unit`].
     pub value: f32,
-    /// What is allowed, in the same unit; 0 if that is not a number.
+    /// Limit, in the same unit; 0 if the cause has none.
     pub limit: f32,
 }
 
@@ -64,11 +64,11 @@ pub enum Unit {
     RadianPerSecond,
     /// m/s.
     MetrePerSecond,
-    /// Either speed: the axis is not known.
+    /// rad/s or m/s: the axis is not known.
     SpeedOfAxis,
     /// ms.
     Millisecond,
-    /// Frames in a row.
+    /// Consecutive frames.
     Frame,
     /// Bits of a [`DriveStatus`].
     DriveStatus,

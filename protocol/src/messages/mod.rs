@@ -1,8 +1,8 @@
 //! One struct per message; its identifier, length and signals are in [`table`](crate::table).
 //!
-//! Axis order is shoulder, elbow, lift, wrist. Quantities are SI. Motor quantities are those of the motor shafts,
-//! before gears and the coupling of lift and wrist; joint quantities follow `[theta1, theta2, d3, theta4]`, lift
-//! positive downwards, as do forces.
+//! Axis order is shoulder, elbow, lift, wrist. Quantities are SI. Motor quantities refer to the motor shafts, before
+//! gears and the coupling of lift and wrist; joint quantities are ordered `[theta1, theta2, d3, theta4]`, lift and its
+//! force positive downwards.
 
 mod cyclic;
 mod fault;
@@ -20,7 +20,7 @@ pub use service::{
     Cause, EStop, EStopReason, Emergency, Heartbeat, Mode, Nmt, NmtCommand, Node, ResetReason,
 };
 
-/// A message of any kind, with the node it concerns where the identifier says so.
+/// Any message, with its node where that is part of the identifier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Message {
@@ -36,9 +36,9 @@ pub enum Message {
     Command(Command),
     /// Operator to controller: a request.
     Motion(Motion),
-    /// Controller to all: how the cabinet is.
+    /// Controller to all: report of the cabinet.
     State(State),
-    /// Controller to operator: what became of a request.
+    /// Controller to operator: outcome of a request.
     MotionReply(MotionReply),
     /// From this server to its client.
     ParameterReply(Server, ParameterReply),

@@ -1,4 +1,4 @@
-//! What an operator asks the controller for, and what it answers.
+//! Requests of an operator, and the controller's replies.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,33 +8,33 @@ use crate::codes::codes;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Motion {
-    /// Number that the reply repeats; wraps.
+    /// Sequence number, repeated by the reply; wraps.
     pub sequence: u8,
-    /// What is asked for.
+    /// The request.
     pub request: MotionRequest,
 }
 
-/// What can be asked of the controller. Joint targets are `[theta1, theta2, d3, theta4]` in rad, rad, m, rad; poses
+/// Requests to the controller. Joint targets are `[theta1, theta2, d3, theta4]` in rad, rad, m, rad; poses
 /// `[x, y, z, yaw]` in frame 0, m, m, m, rad.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MotionRequest {
-    /// Take the axes under torque and hold.
+    /// Switch on torque and hold position.
     Enable,
     /// Brake on, torque off.
     Disable,
-    /// Clear the latched fault if its cause is gone; lands disabled.
+    /// Clear the latched fault if its cause is gone; the axes stay disabled.
     FaultReset,
     /// Controlled stop; empties the queue.
     Stop,
-    /// Straight in joint space.
+    /// Straight move in joint space.
     MoveJoint {
         /// Joint position.
         target: [f32; 4],
         /// Fraction of the joint limits, 0 to 1.
         speed: f32,
     },
-    /// Straight in space.
+    /// Straight line of the tool.
     MoveLine {
         /// Pose.
         target: [f32; 4],
@@ -47,12 +47,12 @@ pub enum MotionRequest {
         target: [f32; 4],
         /// Height of the top in frame 0, m.
         top: f32,
-        /// Vertical rise after which, and fall before which, the motion across may run, m.
+        /// Height above each end below which the motion is strictly vertical, m.
         clearance: f32,
         /// Fraction of the joint limits, 0 to 1.
         speed: f32,
     },
-    /// What hangs on the flange from now on.
+    /// Payload at the flange from now on.
     SetPayload {
         /// Mass, kg.
         mass: f32,
@@ -61,14 +61,14 @@ pub enum MotionRequest {
         /// Moments of inertia about the centre of mass, along the axes of the flange frame, kg m2.
         inertia: [f32; 3],
     },
-    /// Which control law to use.
+    /// Choice of control law.
     SelectLaw {
         /// Law.
         law: Law,
-        /// What it has against constant disturbances.
+        /// Its compensation of constant disturbances.
         compensation: Compensation,
     },
-    /// How stiff the loops are.
+    /// Stiffness of the loops.
     SetGains {
         /// Bandwidth of the position loop, rad/s.
         bandwidth: f32,
@@ -111,7 +111,7 @@ impl MotionRequest {
         }
     }
 
-    /// Whether it asks for a move, which is answered when planned and counted when completed.
+    /// Whether it requests a move, which is answered once planned and counted once completed.
     #[must_use]
     pub const fn is_move(&self) -> bool {
         matches!(
@@ -140,7 +140,7 @@ codes! {
 }
 
 impl Law {
-    /// Whether the law can be helped by a [`Compensation`] other than none.
+    /// Whether the law accepts a [`Compensation`] other than none.
     #[must_use]
     pub const fn takes_compensation(self) -> bool {
         match self {
@@ -151,7 +151,7 @@ impl Law {
 }
 
 codes! {
-    /// What a law has against constant disturbances.
+    /// Compensation of constant disturbances by a law.
     pub enum Compensation {
         /// Nothing.
         None = 0, "none";
@@ -162,13 +162,13 @@ codes! {
     }
 }
 
-/// Controller to operator: what became of a request.
+/// Controller to operator: outcome of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotionReply {
     /// Number of the request.
     pub sequence: u8,
-    /// What became of it.
+    /// Outcome.
     pub outcome: Outcome,
 }
 
@@ -187,7 +187,7 @@ impl Outcome {
     pub const NAMES: &'static [(u8, &'static str)] = &[(0, "accepted"), (1, "refused")];
 }
 
-/// Why a request was refused, where, and what is allowed.
+/// Why a request was refused: axis, value and limit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Refusal {
@@ -197,7 +197,7 @@ pub struct Refusal {
     pub axis: u8,
     /// Value refused, in its own unit; 0 if there is none.
     pub value: f32,
-    /// Bound it violates, in the same unit; 0 if there is none.
+    /// Bound violated, in the same unit; 0 if there is none.
     pub limit: f32,
 }
 
@@ -216,7 +216,7 @@ impl Refusal {
         }
     }
 
-    /// A refusal because of one value of the request.
+    /// Refusal for one value of the request.
     #[must_use]
     pub const fn value(reason: RefusalReason, value: f32, limit: f32) -> Self {
         Self {
@@ -249,13 +249,13 @@ codes! {
         TooNear = 7, "too-near";
         /// An axis would leave its range.
         JointLimit = 8, "joint-limit";
-        /// The way leads through the stretched arm, where a straight line cannot be followed.
+        /// The path passes through the stretched arm, where a straight line cannot be followed.
         Singular = 9, "singular";
         /// The payload is heavier than the robot may carry.
         PayloadTooHeavy = 10, "payload-too-heavy";
-        /// Not while a motion is under way.
+        /// Not allowed while a motion is under way.
         Moving = 11, "moving";
-        /// The drive cannot hold the arm on this move, however slow: a torque would pass its limit.
+        /// The drive cannot hold the arm on this move, however slow: a torque would exceed its limit.
         TorqueTooSmall = 12, "torque-too-small";
         /// A stop came before the move was planned.
         Stopped = 13, "stopped";

@@ -10,9 +10,9 @@ use crate::codes::codes;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Server {
-    /// Asked by the controller.
+    /// Parameters of the drives; the client is the controller.
     Drives,
-    /// Asked by the operator.
+    /// Parameters of the controller; the client is the operator.
     Controller,
 }
 
@@ -45,13 +45,13 @@ pub enum ParameterRequest {
         /// New value, in the parameter's unit.
         value: f32,
     },
-    /// The first parameter from this number on: asked again with the number after each answer, all are listed.
+    /// The first parameter from this number on; repeating it with the number after each answer lists them all.
     List {
         /// Lowest number of interest.
         #[serde(with = "postcard::fixint::le")]
         from: u16,
     },
-    /// Who the client is; the server says who it is.
+    /// Identity of the client; the server answers with its own.
     Hello(Hello),
 }
 
@@ -65,7 +65,7 @@ impl ParameterRequest {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ParameterReply {
-    /// Value after the request, and what is allowed, in the parameter's unit.
+    /// Value after the request, and its range, in the parameter's unit.
     Value {
         /// Number of the parameter.
         #[serde(with = "postcard::fixint::le")]
@@ -79,7 +79,7 @@ pub enum ParameterReply {
     },
     /// Nothing has changed.
     Error {
-        /// Number that was asked for.
+        /// Number requested.
         #[serde(with = "postcard::fixint::le")]
         index: u16,
         /// Why.
@@ -87,7 +87,7 @@ pub enum ParameterReply {
         /// Bound violated, in the parameter's unit; 0 if there is none.
         limit: f32,
     },
-    /// Who the server is.
+    /// Identity of the server.
     Hello(Hello),
 }
 
@@ -97,20 +97,20 @@ impl ParameterReply {
 }
 
 codes! {
-    /// Why a parameter was neither read nor written.
+    /// Why a parameter could not be read or written.
     pub enum ParameterError {
-        /// No parameter of this number, or in a listing none from it on.
+        /// No parameter has this number, or in a listing, none from it on.
         NotFound = 0, "not-found";
         /// The parameter cannot be written.
         ReadOnly = 1, "read-only";
         /// The value is out of the parameter's range.
         OutOfRange = 2, "out-of-range";
-        /// Not in the present state.
+        /// Not allowed in the present state.
         NotNow = 3, "not-now";
     }
 }
 
-/// Who a node is. Enable is refused while the schema hashes of two peers differ.
+/// Identity of a node. Enable is refused while the schema hashes of two peers differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {

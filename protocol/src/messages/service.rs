@@ -28,7 +28,7 @@ pub struct Nmt {
 }
 
 impl Nmt {
-    /// "Start afresh", to `node`.
+    /// Command to `node` to restart.
     #[must_use]
     pub const fn reset(node: Node) -> Self {
         Self {
@@ -56,12 +56,12 @@ codes! {
 
 /// Emergency stop, from any node, repeated until acted upon.
 ///
-/// Unprotected on purpose: a frame on this identifier stops the robot even if it is empty, because a stop too many
+/// Unprotected on purpose: a frame on this identifier stops the robot even if it is empty, because one stop too many
 /// costs less than one too few.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EStop {
-    /// Who asked for it. For the log only: every value stops.
+    /// Origin. For the log only: every value stops.
     pub reason: EStopReason,
     /// Counts the repetitions. For the log only.
     pub counter: u8,
@@ -77,14 +77,14 @@ impl EStopReason {
     pub const UNSPECIFIED: Self = Self(0);
     /// A person pressed a button.
     pub const BUTTON: Self = Self(1);
-    /// Software of the sender asked for it.
+    /// Requested by the sender's software.
     pub const SOFTWARE: Self = Self(2);
 }
 
 /// Emergency object (CiA 301): sent once when a fault is latched, and once with cause none when all are cleared.
 ///
-/// Its eight bytes are fixed by CANopen and leave no room for counter or CRC: nothing may act on it. What the
-/// controller acts on is its own observation, and the protected [`Heartbeat`] repeats the cause.
+/// Its eight bytes are fixed by CANopen and leave no room for counter or CRC: nothing may act on it. The
+/// controller acts on its own observation, and the protected [`Heartbeat`] repeats the cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Emergency {
@@ -101,14 +101,14 @@ pub struct Emergency {
 }
 
 impl Emergency {
-    /// Value that led to the fault; 0 if the bits are no finite number. Its unit is that of [`Emergency::fault`].
+    /// Value that led to the fault; 0 if the bits are not a finite number. Its unit is that of [`Emergency::fault`].
     #[must_use]
     pub const fn value(&self) -> f32 {
         let value = f32::from_bits(self.data);
         if value.is_finite() { value } else { 0.0 }
     }
 
-    /// The fault, as far as eight bytes can tell it: the [`State`](super::State) that follows has axis and limit as well.
+    /// The fault, as far as eight bytes can describe it: the [`State`](super::State) that follows adds axis and limit.
     #[must_use]
     pub const fn fault(&self) -> Fault {
         Fault::value(self.cause, self.value(), 0.0)
@@ -134,7 +134,7 @@ pub struct Heartbeat {
     pub state: Mode,
     /// Latched cause.
     pub cause: Cause,
-    /// Why the node started last.
+    /// Reason of the node's last start.
     pub reset: ResetReason,
 }
 
@@ -145,7 +145,7 @@ codes! {
         PowerOn = 0, "power-on";
         /// Reset pin.
         Pin = 1, "pin";
-        /// Asked for by software or by network management.
+        /// Requested by software or network management.
         Software = 2, "software";
         /// Watchdog expired.
         Watchdog = 3, "watchdog";
@@ -163,19 +163,19 @@ codes! {
     pub enum Mode {
         /// Started, nothing checked yet.
         Boot = 0, "boot";
-        /// Checks itself; stays here on failure.
+        /// Self-test; stays here on failure.
         SelfTest = 1, "self-test";
-        /// Sound, and waits for its peers.
+        /// Passed the self-test; waiting for its peers.
         PreOperational = 2, "pre-operational";
-        /// Would follow an enable.
+        /// Ready to be enabled.
         Ready = 3, "ready";
-        /// Torque on, brake about to release.
+        /// Torque on, brake opening.
         Enabling = 4, "enabling";
         /// Under torque, holding position.
         Enabled = 5, "enabled";
         /// Under torque, on a motion.
         Moving = 6, "moving";
-        /// Controlled stop asked for.
+        /// Controlled stop requested.
         QuickStop = 7, "quick-stop";
         /// Controlled stop after a fault.
         FaultReaction = 8, "fault-reaction";
@@ -197,13 +197,13 @@ codes! {
         SelfTest = 1, "self-test";
         /// Too many feedback frames in a row did not arrive.
         FeedbackLost = 2, "feedback-lost";
-        /// A peer has sent nothing for longer than its watchdog allows.
+        /// A peer has been silent for longer than its watchdog allows.
         PeerSilent = 3, "peer-silent";
         /// Frames arrived late or in the wrong order.
         Reordered = 4, "reordered";
         /// Frames arrived with a wrong end-to-end checksum.
         Corrupted = 5, "corrupted";
-        /// Another node sends on our peer's identifier, or a log is replayed. Reserved: not raised yet.
+        /// Another node sends on the identifier of a peer, or a log is replayed. Reserved: not raised yet.
         DuplicateNode = 6, "duplicate-node";
         /// A position does not change while the axis moves. Reserved: not raised yet.
         StuckSensor = 7, "stuck-sensor";
@@ -221,7 +221,7 @@ codes! {
         OverTorque = 13, "over-torque";
         /// An axis has left its range.
         SoftLimit = 14, "soft-limit";
-        /// The control step took longer than a sample, several times in a row. Reserved: not raised yet.
+        /// The control step took longer than a sample several times in a row. Reserved: not raised yet.
         Overrun = 15, "overrun";
         /// The emergency stop was pressed or sent.
         EStop = 16, "estop";
@@ -229,7 +229,7 @@ codes! {
         DriveFault = 17, "drive-fault";
         /// The peer was built from another message table. Reserved: not raised yet.
         SchemaMismatch = 18, "schema-mismatch";
-        /// An encoder is not valid, or its position has moved further than the axis can in that time.
+        /// An encoder is not valid, or its position has changed by more than the axis can move in that time.
         EncoderFault = 19, "encoder-fault";
     }
 }

@@ -3,7 +3,7 @@
 use super::{Default, Kind, Parameter, Rule, Settable};
 
 /// Declares the parameters of a server: `Variant = number, "name", "unit", when settable, range;`, each under one line
-/// of documentation that is also what a person gets to read at run time.
+/// of documentation, which is also its description at run time.
 macro_rules! parameters {
     (
         $(#[$meta:meta])*
@@ -31,7 +31,8 @@ macro_rules! parameters {
                 }
             }
 
-            /// Numbers and ranges, in the order of `ALL`. Apart from names and units, which an image has no use for.
+            /// Numbers and ranges, in the order of `ALL`. Kept apart from names and units, which an image does not
+            /// need.
             pub const RULES: &'static [Rule] = &[$(Self::$variant.rule(),)+];
 
             /// Number, range, and when it may be written.
@@ -53,11 +54,11 @@ macro_rules! parameters {
 }
 
 parameters! {
-    /// What the controller has. Axes are shoulder, elbow, lift, wrist.
+    /// Parameters of the controller. Axes are shoulder, elbow, lift, wrist.
     pub enum ControllerParameter {
         /// Sampling period that the controller is built for.
         SamplingPeriod = 0x0000, "sampling-period", "s", Never, reading(1e-4, 1e-2);
-        /// Mass that the control law counts with, as announced by set-payload.
+        /// Payload mass that the control law uses, as set by set-payload.
         PayloadMass = 0x0001, "payload-mass", "kg", Never, reading(0.0, 100.0);
         /// Natural frequency of the error dynamics.
         Bandwidth = 0x0010, "bandwidth", "rad/s", AtRest, corner(1.0, 1000.0, (150.0, 0.15));
@@ -75,23 +76,23 @@ parameters! {
         FollowingErrorLift = 0x0022, "following-error-lift", "m", Always, real(0.0002, 0.05, 0.01);
         /// Following error of the wrist that stops the arm.
         FollowingErrorWrist = 0x0023, "following-error-wrist", "rad", Always, real(0.004, 1.0, 0.2);
-        /// How far past its range the shoulder may be before the arm is stopped.
+        /// How far past its range the shoulder may go before the arm is stopped.
         RangeMarginShoulder = 0x0024, "range-margin-shoulder", "rad", Always, real(0.0, 0.1, 0.02);
-        /// How far past its range the elbow may be before the arm is stopped.
+        /// How far past its range the elbow may go before the arm is stopped.
         RangeMarginElbow = 0x0025, "range-margin-elbow", "rad", Always, real(0.0, 0.1, 0.02);
-        /// How far past its range the lift may be before the arm is stopped.
+        /// How far past its range the lift may go before the arm is stopped.
         RangeMarginLift = 0x0026, "range-margin-lift", "m", Always, real(0.0, 0.01, 0.002);
-        /// How far past its range the wrist may be before the arm is stopped.
+        /// How far past its range the wrist may go before the arm is stopped.
         RangeMarginWrist = 0x0027, "range-margin-wrist", "rad", Always, real(0.0, 0.2, 0.05);
         /// Speed that stops the arm, as a multiple of the joint's speed limit.
         SpeedFactor = 0x0028, "speed-factor", "", Always, real(0.05, 1.5, 1.1);
         /// Samples in a row beyond a limit before the arm is stopped.
         FaultSamples = 0x0029, "fault-samples", "samples", Always, whole(1.0, 20.0, 3.0);
-        /// Time the brake is given to open or close; the one of the lift needs 50 ms.
+        /// Time allowed for the brake to open or close; the brake of the lift needs 50 ms.
         BrakeDelay = 0x0030, "brake-delay", "s", AtRest, real(0.05, 1.0, 0.06);
         /// Age of the feedback at which the drives count as silent: torque off, brake.
         FeedbackTimeout = 0x0031, "feedback-timeout", "s", Always, real(0.02, 1.0, 0.1);
-        /// Longest gap in the feedback that the trajectory is continued through.
+        /// Longest gap in the feedback across which the trajectory continues.
         FeedbackGap = 0x0032, "feedback-gap", "s", Always, real(0.001, 0.02, 0.005);
         /// Rejected, stale or duplicate feedback frames in a row that stop the arm.
         BadFrames = 0x0033, "bad-frames", "frames", Always, whole(1.0, 20.0, 3.0);
@@ -99,25 +100,25 @@ parameters! {
 }
 
 parameters! {
-    /// What the drives have. Axes are shoulder, elbow, lift, wrist.
+    /// Parameters of the drives. Axes are shoulder, elbow, lift, wrist.
     pub enum DriveParameter {
-        /// Rated torque of the shoulder's motor, which feedback is scaled with.
+        /// Rated torque of the shoulder's motor, the scale of its feedback.
         RatedTorqueShoulder = 0x1000, "rated-torque-shoulder", "N m", Never, reading(0.0, 200.0);
-        /// Rated torque of the elbow's motor, which feedback is scaled with.
+        /// Rated torque of the elbow's motor, the scale of its feedback.
         RatedTorqueElbow = 0x1001, "rated-torque-elbow", "N m", Never, reading(0.0, 200.0);
-        /// Rated torque of the lift's motor, which feedback is scaled with.
+        /// Rated torque of the lift's motor, the scale of its feedback.
         RatedTorqueLift = 0x1002, "rated-torque-lift", "N m", Never, reading(0.0, 200.0);
-        /// Rated torque of the wrist's motor, which feedback is scaled with.
+        /// Rated torque of the wrist's motor, the scale of its feedback.
         RatedTorqueWrist = 0x1003, "rated-torque-wrist", "N m", Never, reading(0.0, 200.0);
-        /// Part of its greatest torque that the shoulder's motor may give.
+        /// Fraction of its peak torque that the shoulder's motor may give.
         TorqueLimitShoulder = 0x1010, "torque-limit-shoulder", "", AtRest, real(0.1, 1.0, 1.0);
-        /// Part of its greatest torque that the elbow's motor may give.
+        /// Fraction of its peak torque that the elbow's motor may give.
         TorqueLimitElbow = 0x1011, "torque-limit-elbow", "", AtRest, real(0.1, 1.0, 1.0);
-        /// Part of its greatest torque that the lift's motor may give.
+        /// Fraction of its peak torque that the lift's motor may give.
         TorqueLimitLift = 0x1012, "torque-limit-lift", "", AtRest, real(0.1, 1.0, 1.0);
-        /// Part of its greatest torque that the wrist's motor may give.
+        /// Fraction of its peak torque that the wrist's motor may give.
         TorqueLimitWrist = 0x1013, "torque-limit-wrist", "", AtRest, real(0.1, 1.0, 1.0);
-        /// Samples for which the last command is held when none comes; then the drives brake and let go.
+        /// Samples for which the last command is held without a new one; then brake and torque off.
         HoldSamples = 0x1020, "hold-samples", "samples", Always, whole(1.0, 50.0, 5.0);
     }
 }
@@ -156,7 +157,7 @@ const fn reading(lower: f32, upper: f32) -> Range {
     }
 }
 
-/// The default is a number, and rad per sample that it does not exceed.
+/// The default is a value and a limit in rad per sample.
 const fn corner(lower: f32, upper: f32, (most, per_sample): (f32, f32)) -> Range {
     Range {
         kind: Kind::Corner,

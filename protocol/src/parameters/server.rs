@@ -1,15 +1,15 @@
-//! Answers to requests, the same for every node that has parameters.
+//! Parameter server, the same for every node that has parameters.
 
 use super::{ControllerParameter, DriveParameter, Rule};
 use crate::messages::{ParameterError, ParameterReply, ParameterRequest};
 
-/// Where a value is kept.
+/// Where a value is stored.
 pub enum Field<'a> {
-    /// Nowhere that could be written: a reading, which is [never settable](super::Settable::Never).
+    /// Not stored: a reading, which is [never settable](super::Settable::Never).
     Reading(f32),
     /// A real number.
     Real(&'a mut f32),
-    /// A whole one.
+    /// A whole number.
     Whole(&'a mut u32),
 }
 
@@ -33,19 +33,19 @@ impl Field<'_> {
 
 /// A node with parameters.
 pub trait Store {
-    /// Which it has.
+    /// Its parameters.
     type Parameter: Listed;
 
     /// Sampling period, s.
     fn period(&self) -> f32;
 
-    /// Whether parameters may be written that are [settable at rest](super::Settable::AtRest).
+    /// Whether parameters that are [settable at rest](super::Settable::AtRest) may be written now.
     fn is_at_rest(&self) -> bool;
 
-    /// Where this one is kept.
+    /// Where this parameter is stored.
     fn field(&mut self, parameter: Self::Parameter) -> Field<'_>;
 
-    /// This one has just been written.
+    /// Called after this parameter has been written.
     fn changed(&mut self, parameter: Self::Parameter);
 }
 
@@ -67,8 +67,8 @@ impl Listed for DriveParameter {
     const RULES: &'static [Rule] = Self::RULES;
 }
 
-/// Does what is requested, and answers; `None` for [`ParameterRequest::Hello`], which asks for no parameter. The work is
-/// one search by bisection.
+/// Executes a request and answers; `None` for [`ParameterRequest::Hello`], which concerns no parameter. The work is one
+/// search by bisection.
 pub fn serve<S: Store>(store: &mut S, request: &ParameterRequest) -> Option<ParameterReply> {
     let (index, new, exact) = match *request {
         ParameterRequest::Get { index } => (index, None, true),

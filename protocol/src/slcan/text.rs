@@ -4,7 +4,7 @@ use crate::frame::{CanFrame, FrameKind};
 
 use super::{BEL, CR, Line, MAX_LINE, MAX_STAMP};
 
-/// One line ready to send, its end included.
+/// One line ready to send, including its end.
 #[derive(Clone, Copy, Debug)]
 pub struct Text {
     buffer: [u8; MAX_LINE + MAX_STAMP],
@@ -62,7 +62,7 @@ impl Text {
         }
     }
 
-    /// A frame with the time of its arrival behind it, ms of a minute, as `Z1` asks for.
+    /// A frame followed by the time of its arrival, ms within the minute, as `Z1` requests.
     #[must_use]
     pub fn stamped(frame: &CanFrame, milliseconds: u16) -> Self {
         let mut text = Self::new();

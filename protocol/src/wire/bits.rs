@@ -13,14 +13,14 @@ use crate::frame::{CanFrame, FrameKind, Id};
 
 /// Bits after the CRC delimiter: acknowledge slot and delimiter, end of frame, intermission.
 const TRAILER: u32 = 1 + 1 + 7 + INTERMISSION;
-/// Bits of the gap that two frames keep.
+/// Bits of the gap between two frames.
 pub const INTERMISSION: u32 = 3;
 
 /// Length of a frame on the wire, from start of frame to the end of the intermission that follows it.
 ///
 /// With bit rate switch, the BRS bit counts as nominal and the CRC delimiter as data. Both are sent partly at either
-/// rate, the switch being at their sample points: BRS is nominal up to its sample point, the CRC delimiter is nominal
-/// after its. What one has too much the other has too little, so the sum is exact at any sample points.
+/// rate, since the switch is at their sample points: BRS is nominal up to its sample point, the CRC delimiter after its
+/// own. The two errors cancel, so the sum is exact for any sample point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameBits {
     /// Bits at the nominal bit rate; all of them in a frame without bit rate switch.
@@ -36,7 +36,7 @@ impl FrameBits {
         let mut stuffing = Stuffing::default();
         let (arbitration, width) = arbitration_field(frame);
         let dlc = u64::from(frame.dlc());
-        // Start of frame is the dominant bit in front of the arbitration field.
+        // Start of frame is the dominant bit before the arbitration field.
         let arbitration = u64::from(arbitration >> (32 - width));
         match frame.kind() {
             FrameKind::Classical { .. } => {
@@ -60,13 +60,13 @@ impl FrameBits {
                 let head = stuffing.inserted;
                 stuffing.push(u64::from(esi) << 4 | dlc, 5);
                 stuffing.push_bytes(frame.data());
-                // A run that ends with the data field gets no stuff bit: the first fixed one stands there already.
+                // A run that ends with the data field gets no stuff bit: the first fixed one is already there.
                 Layout::of(frame).length(head, stuffing.inserted - head)
             }
         }
     }
 
-    /// Shortest that a frame of this identifier width, kind and length can be: no dynamic stuff bit.
+    /// Shortest frame of this identifier width, kind and length: no dynamic stuff bits.
     #[must_use]
     pub fn without_stuffing(frame: &CanFrame) -> Self {
         Layout::of(frame).length(0, 0)
@@ -74,9 +74,9 @@ impl FrameBits {
 
     /// Upper bound for frames of this identifier width, kind and length, whatever they carry.
     ///
-    /// The textbook bound: a stuff bit after the first five bits, then, the stuff bit opening the next run, after every
-    /// four. It neglects that some header bits are constant and is therefore safe; stuff bits go to the nominal phase
-    /// first, where they last longest.
+    /// The textbook bound: a stuff bit after the first five bits, then after every four, as the stuff bit opens the
+    /// next run. It neglects that some header bits are constant and is therefore safe; stuff bits go to the nominal
+    /// phase first, where they last longest.
     #[must_use]
     pub fn worst_case(frame: &CanFrame) -> Self {
         let layout = Layout::of(frame);
@@ -110,7 +110,7 @@ impl Layout {
             },
             FrameKind::Fd { brs, .. } => {
                 let crc = if data <= 8 * 16 { 17 } else { 21 };
-                // Stuff count with its parity, then CRC; a fixed stuff bit in front and after every fourth bit.
+                // Stuff count with its parity, then CRC; a fixed stuff bit before it and after every fourth bit.
                 let field = 4 + crc;
                 Self {
                     head: 1 + width + 3,
@@ -141,11 +141,11 @@ fn control_bits(frame: &CanFrame) -> u32 {
     if frame.is_extended() { 6 } else { 5 }
 }
 
-/// The bits that arbitration compares, first one as most significant bit of the word, and how many they are.
+/// The bits that arbitration compares, the first one as the most significant bit of the word, and their number.
 ///
 /// Base identifier, RTR (SRR, recessive, in an extended frame), IDE; in an extended frame then identifier extension and
-/// RTR. Two standard words never differ behind their width, and a standard and an extended one differ at IDE or before:
-/// so comparing the words is arbitration, lowest wins.
+/// RTR. Two standard words never differ beyond their width, and a standard and an extended one differ at IDE or before:
+/// so comparing the words is arbitration, and the lowest wins.
 #[must_use]
 pub fn arbitration_field(frame: &CanFrame) -> (u32, u32) {
     let remote = u32::from(frame.is_remote());
@@ -160,8 +160,8 @@ pub fn arbitration_field(frame: &CanFrame) -> (u32, u32) {
 
 /// Counts dynamic stuff bits: a complementary bit after five equal ones, which itself opens the next run.
 ///
-/// A stuff bit is inserted when the bit behind it is sent, because the end of the stuffed region decides whether there
-/// is one behind its last bit.
+/// A stuff bit is inserted when the bit after it is sent, because the end of the stuffed region decides whether its
+/// last bit is followed by one.
 #[derive(Default)]
 struct Stuffing {
     run: Run,
@@ -186,13 +186,13 @@ impl Stuffing {
         }
     }
 
-    /// Stuff bits, with one that the last bit sent calls for.
+    /// Stuff bits, including one required after the last bit sent.
     fn with_last(&self) -> u32 {
         self.inserted + u32::from(self.run.length == 5)
     }
 }
 
-/// The equal bits sent last.
+/// The run of equal bits sent last.
 #[derive(Clone, Copy, Default)]
 struct Run {
     bit: u8,
@@ -201,7 +201,7 @@ struct Run {
 }
 
 impl Run {
-    /// Sends one bit; whether a stuff bit had to go before it.
+    /// Sends one bit; returns whether a stuff bit had to go before it.
     const fn push(&mut self, bit: u8) -> bool {
         let stuff = self.length == 5;
         if stuff {
@@ -218,9 +218,9 @@ impl Run {
     }
 }
 
-/// Where a run stands after a byte, and how many stuff bits that took, by [`Run::index`] and byte.
+/// The run after a byte, and the stuff bits that it took, by [`Run::index`] and byte.
 ///
-/// Bit by bit, a 64-byte payload would cost more than all else the bus does for a frame.
+/// Bit by bit, a 64-byte payload would cost more than everything else that the bus does for a frame.
 static BYTES: [[(Run, u8); 256]; 12] = {
     let mut table = [[(Run { bit: 0, length: 0 }, 0); 256]; 12];
     let mut index = 0;

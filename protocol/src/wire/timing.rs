@@ -12,8 +12,8 @@ const MAX_DATA: u32 = 8_000_000;
 
 /// Bit rates and nominal sample point, the same in every node.
 ///
-/// There is no sample point of the data phase: it moves the two instants of the rate switch by the same amount in
-/// opposite directions (see [`FrameBits`]), and nothing that leaves the bus happens between them.
+/// The sample point of the data phase is left out: it moves the two instants of the rate switch by the same amount in
+/// opposite directions (see [`FrameBits`]), and nothing observable happens between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitTiming {
     nominal: u32,
@@ -28,7 +28,7 @@ pub enum TimingError {
     Nominal(u32),
     /// Data bit rate, bit/s, out of range.
     Data {
-        /// The rate asked for.
+        /// The rate requested.
         data: u32,
         /// Nominal bit rate.
         nominal: u32,
@@ -103,17 +103,17 @@ impl BitTiming {
         self.data
     }
 
-    /// How long so many bits take; either phase rounded up to a whole ns.
+    /// Duration of these bits; each phase is rounded up to a whole ns.
     #[must_use]
     pub fn duration(&self, bits: FrameBits) -> Duration {
         time_of(u64::from(bits.nominal) * 1000, self.nominal)
             + time_of(u64::from(bits.data) * 1000, self.data)
     }
 
-    /// From the instant a frame is valid for its receivers to the end of the intermission.
+    /// Time from the instant a frame is valid for its receivers to the end of the intermission.
     ///
-    /// Receivers take a frame as valid at the sample point of the last but one bit of end of frame: they ignore the
-    /// value of the last one (ISO 11898-1, frame validation).
+    /// Receivers accept a frame as valid at the sample point of the last but one bit of the end of frame: they ignore
+    /// the value of the last one (ISO 11898-1, frame validation).
     #[must_use]
     pub fn after_valid(&self) -> Duration {
         let whole_bits = u64::from(INTERMISSION + 1);

@@ -225,7 +225,7 @@ pub(crate) fn heartbeat() -> impl Strategy<Value = Message> {
         })
 }
 
-/// Any message with any values that are allowed in it.
+/// Any message with any allowed values.
 pub(crate) fn message() -> impl Strategy<Value = Message> {
     prop_oneof![
         nmt(),
@@ -302,7 +302,7 @@ pub(crate) fn frame_of(id: u16, fd: bool, data: &[u8]) -> CanFrame {
     .unwrap()
 }
 
-/// A frame with this body, zero-padded, and right protection: the sender's software is wrong, the wire is not.
+/// A frame with this body, zero-padded and correctly protected: an error of the sender's software, not of the wire.
 pub(crate) fn protected(info: &MessageInfo, body: &[u8]) -> CanFrame {
     let mut data = vec![0; info.len];
     data[..body.len()].copy_from_slice(body);

@@ -1,7 +1,7 @@
-//! The wire, frozen: one literal frame for every message and every variant.
+//! Frozen wire format: one literal frame for every message and variant.
 //!
 //! The bytes were not made by this crate: they were packed by a separate script from the layout in the message table,
-//! with CRCs computed bit by bit. A frame of a released version is never edited here, only added to.
+//! with CRCs computed bit by bit. Frames of a released version are never edited here; new ones are added.
 
 mod motion;
 
@@ -109,7 +109,7 @@ fn state() {
             law: Law::ComputedTorqueJoint,
             compensation: Compensation::Integral,
             tracking_error: [0.5, -0.25, 0.125, -1.0],
-            // What the frame had no field for yet: zeros, as the padding was.
+            // Fields added later: zeros, as the padding was.
             fault_axis: FaultAxis::None,
             fault_value: 0.0,
             fault_limit: 0.0,
@@ -120,7 +120,7 @@ fn state() {
     );
 }
 
-/// A fault with its axis and number, in what was padding before.
+/// A fault with its axis and number, in former padding.
 #[test]
 fn state_with_a_fault() {
     check(

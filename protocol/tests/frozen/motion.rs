@@ -1,4 +1,4 @@
-//! One frame for every request of an operator.
+//! One frame per request of an operator.
 
 use super::*;
 
