@@ -1,4 +1,4 @@
-//! Hands the linker the memory map of a board, on the target only.
+//! Passes the memory map of a board to the linker, on the target only.
 
 use std::path::Path;
 use std::{env, fs};

@@ -1,5 +1,5 @@
-//! What every board needs around the node, and no board should write again: pins, the clock of samples, the record of a stop
-//! that survives a reset, and the log of changes.
+//! What every board needs around the node: pins, the sample clock, the record of a stop that survives a reset, and the
+//! log of changes.
 
 #[cfg(feature = "defmt")]
 pub mod journal;

@@ -1,36 +1,36 @@
 //! Controller of a SCARA drive cabinet, in fixed memory and in `f32`.
 //!
-//! The crate is the control code and nothing around it: no clock, no heap, no operating system, no bus driver. The same
+//! The crate is the control code alone: no clock, no heap, no operating system, no bus driver. The same
 //! code runs on a host against a simulated robot and on a Cortex-M4F.
 //!
-//! # What lives here
+//! # Contents
 //!
-//! Five rooms; each leans only on those below it.
+//! Five modules; each depends only on those below it.
 //!
 //! ```text
-//! cabinet      what every board needs around the node: pins, reset record, log, clock of samples
+//! cabinet      what every board needs around the node: pins, reset record, log, sample clock
 //! node         the controller on the bus: frames in, frames out
 //! control      one sample: readings, monitor, state, reference, law, limits
 //! trajectory   from a request to a reference for every sample
 //! mechanics    the arm: kinematics, dynamics, drives
 //! ```
 //!
-//! # The way of one Feedback frame
+//! # The path of one Feedback frame
 //!
-//! A board or the simulator calls [`Node::poll`](node::Node::poll) when a frame has come. The node decodes and judges
-//! it, counts it if it is refused, and makes [`Readings`](control::controller::Readings) of a fresh Feedback. One call of
-//! [`Controller::step`](control::controller::Controller::step) follows:
+//! A board or the simulator calls [`Node::poll`](node::Node::poll) when a frame has arrived. The node decodes and
+//! checks it, counts it if it is refused, and turns a fresh Feedback into [`Readings`](control::controller::Readings).
+//! One call of [`Controller::step`](control::controller::Controller::step) follows:
 //!
 //! ```text
 //! counts -> joints      mechanics::dynamics::drive
-//! monitor, state        control::monitor, control::states: may it move, must it stop
+//! monitor, state        control::monitor, control::states: may the arm move, must it stop
 //! reference             trajectory::queue: where the arm should be now, and when the command will act
 //! control input         control::laws::control_input: kinematics and dynamics at the measured position
 //! law                   control::laws: joint efforts
 //! limits                control::limits: cut to what the motors can give
 //! ```
 //!
-//! The motor torques leave as a Command at once. What is left of the call belongs to a report or to one bounded step of
+//! The motor torques leave as a Command at once. The rest of the call goes to a report or to one bounded step of
 //! planning; [`phase`](control::phase) lets a board measure every part.
 //!
 //! # Conventions
@@ -41,8 +41,8 @@
 //! * Frames follow the standard (distal) Denavit-Hartenberg table of the arm. Frame 0 has z up; frame 4, the tool flange,
 //!   has z down. Yaw is `theta1 + theta2 - theta4`.
 //! * Equation numbers in the comments are those of "In-Depth Analysis of Kinematic, Dynamic, and Control Aspects of a
-//!   4-Axis SCARA Robot Manipulator", the paper this controller implements; what is wrong in print is said where it is put
-//!   right.
+//!   4-Axis SCARA Robot Manipulator", the paper this controller implements; errors of the paper are noted where they
+//!   are corrected.
 
 #![no_std]
 #![forbid(unsafe_code)]

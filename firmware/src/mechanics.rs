@@ -1,8 +1,9 @@
-//! The arm: its data, where it is, how fast, and what moving it takes.
+//! The arm: its data, kinematics and dynamics.
 //!
-//! [`arm`] holds geometry, inertia, limits and drives; [`kinematics`] and [`jacobian`] say where the tool is and how fast;
-//! [`dynamics`] what efforts a motion takes, and [`body`] does so for one payload. Everything is a pure function in `f32`,
-//! on the elementary functions of [`math`], which give the same bits on every machine. Leans on nothing else in this crate.
+//! [`arm`] holds geometry, inertia, limits and drives; [`kinematics`] and [`jacobian`] give position and
+//! velocity of the tool; [`dynamics`] the efforts of a motion, and [`body`] the same for one payload. Everything is a
+//! pure function in `f32`, built on the elementary functions of [`math`], which give the same bits on every machine.
+//! Depends on nothing else in this crate.
 
 pub mod arm;
 pub mod body;

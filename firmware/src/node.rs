@@ -1,9 +1,8 @@
 //! The controller on the bus: frames in, one control sample when feedback arrives, frames out.
 //!
-//! Arrival drives, a timer guards: [`Node::poll`] is called with each frame that has come, and
-//! without one when none comes for some samples; only feedback moves the control on, the time
-//! handed in only ages it. So lock-step, a virtual bus in real time and a real bus run one and
-//! the same path.
+//! Frame arrival drives the control; a timer only supervises. [`Node::poll`] is called with each frame that has
+//! arrived, and without one when none arrives for some samples. Only feedback advances the control; the time passed in
+//! only ages the feedback. So lock-step, a virtual bus in real time and a real bus all run the same code path.
 
 mod parameters;
 
@@ -27,17 +26,17 @@ use crate::control::phase::{Phase, Probe};
 use crate::control::self_test;
 use crate::control::states::Event;
 
-/// Age of the feedback at which the drives count as silent, unless set otherwise: torque off, brake.
+/// Default age of the feedback at which the drives count as silent: torque off, brake.
 pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
 /// Period of the state message.
 const STATE_PERIOD: Duration = Duration::from_millis(20);
 /// Period of the heartbeat.
 const HEARTBEAT_PERIOD: Duration = Duration::from_millis(100);
-/// Planning rests in every tenth sample, so that what is to be reported waits no longer: half the period of the state at
-/// 1 kHz, for a tenth of the planning. In samples and not in time, so that the same feedback gives the same torques.
+/// Planning pauses every tenth sample, so that no report waits longer: half the period of the state at 1 kHz, for a
+/// tenth of the planning. Counted in samples and not in time, so that the same feedback gives the same torques.
 const REPORT_SAMPLES: u32 = 10;
-/// Answers that may wait for such a sample; with more, reports come beside planning. Two leave the outbox room for a request
-/// in every sample until then.
+/// Answers that may wait for such a sample; with more, reports are sent in spite of planning. Two leave room in the
+/// outbox for a request in every sample until then.
 const MAX_ANSWERS_WAITING: usize = 2;
 
 /// A controller with its place on the bus.
@@ -54,13 +53,13 @@ pub struct Node {
     bad_feedback: u8,
     /// Sample number and arrival of the newest feedback.
     newest: Option<(u32, Instant)>,
-    /// Samples answered.
+    /// Number of samples answered.
     samples: u32,
-    /// The drives were built from the same message table.
+    /// Whether the drives were built from the same message table.
     same_schema: bool,
     overruns: u16,
     worst_tick: u32,
-    /// Why the node was started, and whether network management has asked for another start.
+    /// Why the node was started, and whether network management has requested a reset.
     reset: ResetReason,
     reset_asked: bool,
     next_state: Instant,
@@ -69,7 +68,7 @@ pub struct Node {
 
 impl Node {
     /// A node in self-test, started for this reason.
-    // Out of line it is built in place; inlined it would take its own size once more on the stack.
+    // Out of line it is built in place; inlined it would take its size on the stack a second time.
     #[inline(never)]
     pub fn new(config: Config, reset: ResetReason) -> Self {
         Self {
@@ -94,43 +93,44 @@ impl Node {
         }
     }
 
-    /// The controller, to look at.
+    /// The controller, read-only.
     pub fn controller(&self) -> &Controller {
         &self.controller
     }
 
-    /// Frames received and not used so far, by cause.
+    /// Frames received but not used so far, by cause.
     pub fn received(&self) -> &Counters {
         &self.received
     }
 
-    /// Frames that could not be sent so far, answers to a flood of requests included.
+    /// Frames that could not be sent so far, including answers to a flood of requests.
     pub fn unsent(&self) -> u16 {
         self.unsent.saturating_add(self.controller.unanswered())
     }
 
-    /// A shell reports a tick that ended after its deadline.
+    /// For a shell to report a tick that ended after its deadline.
     pub fn count_overrun(&mut self) {
         self.overruns = self.overruns.saturating_add(1);
     }
 
-    /// A shell that can measure a tick reports its cycles of the core; the most are kept.
+    /// For a shell to report the core cycles of a tick, if it can measure them; the maximum is kept.
     pub fn note_tick(&mut self, cycles: u32) {
         self.worst_tick = self.worst_tick.max(cycles);
     }
 
-    /// Network management has asked for a reset: the shell is to start a new node. This one says no more.
+    /// Whether network management has requested a reset: the shell then has to start a new node. This one sends nothing
+    /// more.
     pub fn reset_asked(&self) -> bool {
         self.reset_asked
     }
 
-    /// Takes the frame that has arrived, if any, and sends into `bus` what is due. `now` never runs
-    /// backwards; where it starts does not matter.
+    /// Processes the frame that has arrived, if any, and sends whatever is due to `bus`. `now` must never run
+    /// backwards; its origin does not matter.
     pub fn poll<B: Transmit>(&mut self, now: Instant, received: Option<&CanFrame>, bus: &mut B) {
         self.poll_with(now, received, bus, &mut ());
     }
 
-    /// As [`Node::poll`], with a probe that measures the phases.
+    /// Like [`Node::poll`], with a probe that measures the phases.
     pub fn poll_with<B: Transmit, P: Probe>(
         &mut self,
         now: Instant,
@@ -164,15 +164,15 @@ impl Node {
         }
         probe.end(Phase::Decode);
         self.guard(now);
-        // Not beside planning, so that a call is never long for both; unless an operator asks so fast
-        // that the answers pile up.
+        // Not in the same call as planning, so that no call does both, unless an operator sends requests so fast that
+        // the answers pile up.
         if !planned || self.controller.answers_waiting() > MAX_ANSWERS_WAITING {
             self.report(now, bus);
         }
         probe.end(Phase::Report);
     }
 
-    /// Acts on a message; returns whether it has led to planning.
+    /// Acts on a message; returns whether that included planning.
     fn take<B: Transmit, P: Probe>(
         &mut self,
         message: &Message,
@@ -206,7 +206,7 @@ impl Node {
             }
             Message::ParameterReply(Server::Drives, reply) => {
                 let verdict = self.drives_parameter.check(counter);
-                // Introductions concern neighbours only.
+                // Hello concerns direct peers only.
                 if self.accept(verdict) && !matches!(reply, ParameterReply::Hello(_)) {
                     self.reply_parameter(*reply, bus);
                 }
@@ -215,14 +215,13 @@ impl Node {
                 let for_us = nmt.node == 0 || nmt.node == Name::Controller.code();
                 self.reset_asked |= for_us && nmt.command == NmtCommand::ResetNode;
             }
-            // What other nodes tell each other, or the operator.
+            // Messages between other nodes, or to the operator.
             _ => {}
         }
         false
     }
 
-    /// One control sample: the only place where the control moves on. Returns whether a move was
-    /// planned on.
+    /// One control sample: the only place where the control advances. Returns whether planning took a step.
     fn sample<B: Transmit, P: Probe>(
         &mut self,
         feedback: &Feedback,
@@ -259,8 +258,8 @@ impl Node {
         };
         self.send(&Message::Command(command), bus);
         probe.end(Phase::Encode);
-        // Now that the command is on its way. By the count of samples and not by the time, so that
-        // the same feedback gives the same torques whenever it comes.
+        // Now that the command is on its way. By sample count and not by time, so that the same
+        // feedback gives the same torques whenever it arrives.
         self.samples = self.samples.wrapping_add(1);
         let planned = !self.samples.is_multiple_of(REPORT_SAMPLES) && self.controller.plan();
         probe.end(Phase::Planning);
@@ -286,7 +285,7 @@ impl Node {
         }
     }
 
-    /// Counts what the counter says was lost, repeated or late; `true` for a frame to act on.
+    /// Counts lost, repeated and late frames by the verdict; `true` for a frame to act on.
     fn accept(&mut self, verdict: Verdict) -> bool {
         self.received.count(verdict);
         !matches!(verdict, Verdict::Duplicate | Verdict::Stale(_))
@@ -304,7 +303,7 @@ impl Node {
         }
     }
 
-    /// Several bad feedback frames in a row stop the arm.
+    /// Counts bad feedback frames; several in a row stop the arm.
     fn suspect(&mut self, cause: Cause) {
         self.bad_feedback = self.bad_feedback.saturating_add(1);
         if u32::from(self.bad_feedback) >= self.controller.setup().bad_frames {
@@ -314,7 +313,7 @@ impl Node {
         }
     }
 
-    /// Ages the feedback.
+    /// Checks the age of the feedback.
     fn guard(&mut self, now: Instant) {
         let Some((_, arrived)) = self.newest else {
             return;
@@ -332,14 +331,14 @@ impl Node {
         }
     }
 
-    /// What is due: a reply, an emergency, state and heartbeat.
+    /// Sends what is due: a reply, an emergency, state and heartbeat.
     fn report<B: Transmit>(&mut self, now: Instant, bus: &mut B) {
-        // One a call: requests that are refused together are answered sample by sample.
+        // One per call: requests refused together are answered sample by sample.
         if let Some(reply) = self.controller.take_reply() {
             self.send(&Message::MotionReply(reply), bus);
         }
         if let Some(alarm) = self.controller.take_alarm() {
-            // The state that follows at once says which axis it was.
+            // The state that follows at once names the axis.
             self.next_state = now;
             let emergency = Emergency::new(alarm.cause, alarm.value.to_bits());
             self.send(&Message::Emergency(Name::Controller, emergency), bus);

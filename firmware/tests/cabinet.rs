@@ -1,4 +1,4 @@
-//! The pins of the cabinet, on pins that remember.
+//! The pins of the cabinet, on recording pins.
 
 use core::convert::Infallible;
 use std::cell::Cell;
@@ -119,6 +119,6 @@ fn a_broken_pin_is_reported_and_the_others_are_written() {
     assert_eq!([&brake, &torque, &red].map(Cell::get), [false; 3]);
     assert!(
         cabinet.estop_pressed(),
-        "what cannot be read counts as pressed"
+        "a pin that cannot be read counts as pressed"
     );
 }

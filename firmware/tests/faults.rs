@@ -8,8 +8,8 @@ use protocol::messages::Cause;
 #[path = "common/table.rs"]
 mod table;
 
-/// The table once more, from the safety rules and not from the code: cause, limit, reaction of an arm that works, stops,
-/// closes its brake, and what ends the fault.
+/// A second copy of the table, from the safety rules and not from the code: cause, limit, reaction in normal operation,
+/// while stopping and while the brake closes, and what ends the fault.
 const ORACLE: &str = "
 self-test       at once      nothing        nothing        nothing        restart
 feedback-lost   5 ms         stop           brake          nothing        reset
@@ -51,7 +51,7 @@ fn latch(latch: Latch) -> &'static str {
     }
 }
 
-/// What detects it, for the docs; no code depends on it.
+/// What detects the cause, for the docs; no code depends on it.
 fn seen_by(cause: Cause) -> &'static str {
     match cause {
         Cause::SelfTest => "known answers of mathematics, kinematics and CRC; ranges of the model",

@@ -1,4 +1,4 @@
-//! Properties of the drive train: the two directions undo each other, power is conserved, friction only takes it.
+//! Properties of the drive train: the two directions are inverses, power is conserved, and friction only dissipates it.
 
 mod common;
 
@@ -43,7 +43,7 @@ proptest! {
     #[test]
     fn motor_side_follows_the_coupling_matrix(train in train(), q in position(), torque in torque()) {
         let (drive, a) = (Drive::new(&train), matrix(&train));
-        // Three roundings in the coefficient, one a product, one the sum.
+        // Three roundings in the coefficient, one per product, one for the sum.
         let bound = a.abs() * wide(&q).abs() * (5.0 * U);
         assert_close("angle", &drive.motor_angle(&q), &(a * wide(&q)), &bound);
         let bound = a.transpose().abs() * wide(&torque).abs() * (5.0 * U);
@@ -65,7 +65,7 @@ proptest! {
         assert_close("torque", &back, &wide(&torque), &bound);
     }
 
-    /// tanh x and x cut to +-1 differ most at x = 1, by 1 - tanh 1 = 0.2384, and by less than 2 e^-2x beyond.
+    /// tanh x and x clamped to +-1 differ most at x = 1, by 1 - tanh 1 = 0.2384, and by less than 2 e^-2x beyond.
     #[test]
     fn coulomb_friction_of_plans_is_that_of_laws_away_from_rest(train in train(), qd in speed()) {
         let drive = Drive::new(&train);
@@ -80,7 +80,7 @@ proptest! {
         }
     }
 
-    /// Gears neither make nor take power: motor torque times motor speed is joint effort times joint speed.
+    /// Gears conserve power: motor torque times motor speed is joint effort times joint speed.
     #[test]
     fn power_is_conserved(train in train(), qd in speed(), torque in torque()) {
         let drive = Drive::new(&train);
@@ -90,7 +90,7 @@ proptest! {
         prop_assert!(gap <= 4.0 * U * terms, "{gap:e} W of {terms} W");
     }
 
-    /// Rotors at the joints are the rotors at the motors, seen through the gears.
+    /// Rotor inertia at the joints is the rotor inertia at the motors, reflected through the gears.
     #[test]
     fn reflected_inertia_is_that_of_the_rotors(train in train(), qdd in acceleration()) {
         let drive = Drive::new(&train);
@@ -128,7 +128,7 @@ proptest! {
         let count = std::f64::consts::TAU / f64::from(IRB_930.drive.encoder_counts);
         let exact = Vector4::from(counts.map(|n| f64::from(n) * count));
         assert_close("angle", &phi, &exact, &(exact.abs() * (3.0 * U)));
-        // There and back are 4 roundings of less than 2^23 counts: 2 counts.
+        // There and back is 4 roundings of less than 2^23 counts: 2 counts.
         let back = drive.counts_of_motor_angle(&phi);
         prop_assert!(counts.iter().zip(back).all(|(&there, back)| (there - back).abs() <= 2), "{counts:?} {back:?}");
     }

@@ -1,6 +1,6 @@
-//! Properties of the dynamics, for any arm and payload: two derivations agree, and mechanics' own laws hold.
+//! Properties of the dynamics, for any arm and payload: two derivations agree, and the laws of mechanics hold.
 //!
-//! The bounds are counted roundings times the magnitudes of `common::magnitude`.
+//! The bounds are numbers of roundings times the magnitudes of `common::magnitude`.
 
 mod common;
 
@@ -48,7 +48,7 @@ fn assert_matrix_close(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 
-    /// What laws and planner multiply with, matrix or not, is links plus rotors.
+    /// The inertia that laws and planner use, as a matrix or not, is links plus rotors.
     #[test]
     fn the_mass_of_the_body_is_that_of_links_and_rotors(
         arm in arm(), payload in payload(), q in position(), qdd in acceleration(),
@@ -155,7 +155,7 @@ proptest! {
         assert_matrix_close("M'", &rate, &(coriolis + coriolis.transpose()), &bound);
     }
 
-    /// The accelerations that forward dynamics gives need the efforts it was given.
+    /// The accelerations from forward dynamics require the efforts that it was given.
     #[test]
     fn inverse_of_forward_is_the_identity(
         arm in arm(), payload in payload(), q in position(), qd in speed(), qdd in acceleration(),
@@ -166,7 +166,7 @@ proptest! {
         let found = lagrange.forward(&trig, &qd, &tau);
         // Residual of elimination without pivoting on a positive definite matrix of order 3 (Higham 2002, thm 10.3 and
         // 10.4): 10 u |L| D |L^T| |x|, and an element of that product is at most the root of the product of the
-        // diagonal elements: the rates of the three bodies may be taken for independent.
+        // diagonal elements: the rates of the three bodies count as independent.
         let rates = Vector4::new(
             found.x.abs(), (found.x + found.y).abs(), (found.x + found.y - found.w).abs(), 0.0,
         ).map(f64::from);

@@ -1,4 +1,5 @@
-//! The elementary functions against the host's f64 functions: dense sweeps for the stated errors, any bits for totality.
+//! The elementary functions against the host's f64 functions: dense sweeps for the stated errors, arbitrary bits for
+//! totality.
 
 mod common;
 
@@ -46,7 +47,7 @@ fn sine_and_cosine_keep_their_error() {
             assert_sin_cos(x, 2.5 * U);
         }
     }
-    // Where the quadrant changes, and where the sine loses its leading digits.
+    // Where the quadrant changes and the sine loses its leading digits.
     for eighth in -20_000..=20_000 {
         for x in neighbourhood(f64::from(eighth) * FRAC_PI_2 / 2.0) {
             if x.abs() <= 8192.0 {
@@ -58,7 +59,7 @@ fn sine_and_cosine_keep_their_error() {
 
 #[test]
 fn the_cube_root_keeps_its_error() {
-    // Three octaves hold every remainder of the exponent; the extremes hold every range that is promised.
+    // Three octaves cover every remainder of the exponent; the extremes cover the whole documented range.
     for octaves in [-126, -60, -3, 0, 60, 123] {
         for step in 0..300_000 {
             let x = (f64::from(octaves) + 3.0 * f64::from(step) / 300_000.0).exp2() as f32;
@@ -108,7 +109,7 @@ fn wrapped_angle_keeps_its_error() {
 #[test]
 fn wrap_closes_the_range_above() {
     use std::f32::consts::PI;
-    // Next to half a turn the rounded quotient may be the neighbour of the right one.
+    // Close to half a turn the rounded quotient may be off by one.
     for odd in (-2601..=2601).step_by(2) {
         for angle in neighbourhood(f64::from(odd) * std::f64::consts::PI) {
             let wrapped = wrap(angle);

@@ -1,4 +1,5 @@
-//! Properties of the differential kinematics: the Jacobian is the derivative of the pose, its inverses invert, damping bounds.
+//! Properties of the differential kinematics: the Jacobian is the derivative of the pose, its inverses invert
+//! it, and damping bounds the speeds.
 
 mod common;
 
@@ -9,7 +10,7 @@ use firmware::mechanics::kinematics::Trig;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use proptest::prelude::*;
 
-/// Error of an element, as its documentation says.
+/// Error of an element, as documented.
 fn element_error(arm: &ArmModel) -> f64 {
     U * (5.0 * f64::from(arm.geometry.a1) + 12.0 * f64::from(arm.geometry.a2))
 }
@@ -43,7 +44,7 @@ fn wide(vector: &Vector4<f32>) -> Vector4<f64> {
     vector.map(f64::from)
 }
 
-/// Horizontal task velocities up to 10 m/s, the rest alike.
+/// Horizontal task velocities up to 10 m/s, the other components likewise.
 fn task_velocity() -> impl Strategy<Value = Vector4<f32>> {
     within(Vector4::new(10.0, 10.0, 3.0, 30.0))
 }
@@ -63,7 +64,7 @@ proptest! {
         }
     }
 
-    /// The geometric Jacobian has the task rows, and two rows that a SCARA cannot have anything in.
+    /// The geometric Jacobian has the task rows, and two rows that are zero in a SCARA.
     #[test]
     fn geometric_rows_are_the_task_rows(arm in arm(), q in position()) {
         let jacobian = jacobian(&arm, &q);
@@ -98,7 +99,7 @@ proptest! {
         assert_close("rate times qd", &(jacobian.time_derivative(&qd) * qd), &difference, &bound);
     }
 
-    /// Product and sum of squares, which between them leave no other pair; and what they mean.
+    /// Product and sum of squares determine the pair of singular values; and their meaning.
     #[test]
     fn singular_values_bound_the_velocity(arm in arm(), q in position(), angle in 0.0..std::f32::consts::TAU) {
         let jacobian = jacobian(&arm, &q);
@@ -107,7 +108,7 @@ proptest! {
         let task = jacobian.task().map(f64::from);
         let sum: f64 = task.fixed_view::<2, 2>(0, 0).iter().map(|element| element * element).sum();
         prop_assert!(greatest >= least && least >= 0.0);
-        // Four squares and their sums 4 u, the gap 4 u, the roots halve what they get: below 8 u all told.
+        // Four squares and their sums 4 u, the gap 4 u, and the roots halve their errors: below 8 u in total.
         prop_assert!((greatest * greatest + least * least - sum).abs() <= 16.0 * U * sum);
         prop_assert!((greatest * least - f64::from(jacobian.determinant()).abs()).abs() <= 2.0 * U * sum);
 
@@ -122,7 +123,7 @@ proptest! {
     fn determinant_is_that_of_the_planar_block(arm in arm(), q in position()) {
         let jacobian = jacobian(&arm, &q);
         let task = jacobian.task().map(f64::from);
-        // Of the whole matrix: the lift's -1 times the wrist's -1 times the block.
+        // Determinant of the whole matrix: the lift's -1 times the wrist's -1 times the block's.
         let block = task.m11 * task.m22 - task.m12 * task.m21;
         prop_assert!((f64::from(jacobian.determinant()) - block).abs() <= 4.0 * reach(&arm) * element_error(&arm));
     }
@@ -136,7 +137,8 @@ proptest! {
             return Ok(());
         };
         let qd = jacobian.joint_speed(&v).expect("defined where the inverse is");
-        // The cofactors over the determinant are each good to a few roundings of J's own elements, times their condition.
+        // The cofactors over the determinant are each exact to a few roundings of the elements of J, times their
+        // condition.
         let (a1, a2) = (f64::from(arm.geometry.a1), f64::from(arm.geometry.a2));
         let norm = reach(&arm) + a2;
         let gain = norm / (a1 * a2 * sine);
@@ -159,10 +161,10 @@ proptest! {
 
             let horizontal = f64::from(v.x).hypot(f64::from(v.y));
             let speed = f64::from(qd.x).hypot(f64::from(qd.y));
-            // The determinant and the elements come from different roundings: 1 % covers them at the worst gain there is.
+            // The determinant and the elements are rounded separately: 1 % covers that at the worst gain.
             prop_assert!(speed <= 1.155 / onset * horizontal * 1.01, "{speed} rad/s at {q}");
 
-            // The estimate of the least value is low by at most the root of 2.
+            // The estimate of the least singular value is low by at most a factor of sqrt 2.
             if f64::from(least) > 1.5 * onset {
                 let exact = jacobian.joint_speed(&v).expect("regular");
                 let bound = Vector4::repeat(32.0 * U * (horizontal / onset + f64::from(v.abs().sum())));
@@ -175,7 +177,7 @@ proptest! {
         }
     }
 
-    /// What makes it damped least squares: `|J w - v|^2 + damping |w|^2` is least, so that its gradient is zero and
+    /// The definition of damped least squares: `|J w - v|^2 + damping |w|^2` is minimal, so its gradient is zero and
     /// `J^T (v - J w)` is the damping times w, a damping between zero and a quarter of the squared onset.
     #[test]
     fn damped_speed_is_a_least_squares_solution(q in position(), near_stretch in -0.2..=0.2f32, v in task_velocity()) {
@@ -186,9 +188,9 @@ proptest! {
         let (w, v) = (wide(&qd).xy(), wide(&v).xy());
         let gradient = block.transpose() * (v - block * w);
 
-        // The determinant and the elements it stands for are rounded apart, by 4 reach times an element's error. With n for
-        // the norm of the block, the denominator is at least n^2 e^2 / 4, so that w is off by at most 16 reach / (n e^2) of
-        // that times v, and the gradient by n^2 of it; all other roundings are of smaller terms.
+        // The determinant and the elements it is made of are rounded separately, by 4 reach times an element's error.
+        // With n for the norm of the block, the denominator is at least n^2 e^2 / 4, so that w is off by at most 16
+        // reach / (n e^2) of that times v, and the gradient by n^2 of it; all other roundings are of smaller terms.
         let onset = f64::from(DAMPING_ONSET) * reach(&IRB_930);
         let norm = block.iter().map(|element| element * element).sum::<f64>().sqrt();
         let length = |x: Vector2<f64>| x.x.hypot(x.y);

@@ -1,4 +1,4 @@
-//! Properties of the kinematics: forward and inverse undo each other, velocities follow, limits hold.
+//! Properties of the kinematics: forward and inverse undo each other, velocities agree, and limits hold.
 
 mod common;
 
@@ -37,7 +37,7 @@ fn is_within_limits(arm: &ArmModel, q: &Vector4<f32>) -> bool {
         .all(|axis| (axis.of(&limits.lower)..=axis.of(&limits.upper)).contains(&axis.of(q)))
 }
 
-/// Difference of two angles, whole turns apart or not.
+/// Difference of two angles, ignoring whole turns.
 fn turn_between(a: f32, b: f32) -> f64 {
     let turn = f64::from(a) - f64::from(b);
     (turn - TAU * (turn / TAU).round()).abs()
@@ -48,9 +48,9 @@ proptest! {
 
     /// Any posture within the limits has a pose, and that pose has a joint position for either elbow that leads back to it.
     ///
-    /// The pose is off by the error of two forward computations and of the solution seen from the flange. The bend takes the
-    /// radius through: 4 u of it and REACH_TOLERANCE where it is clamped; it and theta1 are rounded, 8 u of pi each at
-    /// most, times the reach.
+    /// The error of the pose is that of two forward computations and of the solution seen from the flange. The elbow
+    /// passes on the error of the radius: 4 u of it, and REACH_TOLERANCE where it is clamped; elbow and theta1 are
+    /// rounded, at most 8 u of pi each, times the reach.
     #[test]
     fn forward_of_inverse_is_the_pose(arm in real_arm(), q in position()) {
         let pose = forward(&arm.geometry, &q);
@@ -62,13 +62,15 @@ proptest! {
             let found = found.map_err(|error| TestCaseError::fail(error.to_string()))?;
             let again = forward(&arm.geometry, &found);
             prop_assert!(distance(&again, &pose) <= bound, "{:e} of {bound:e}", distance(&again, &pose));
-            // theta4 takes up what theta1 and theta2 are off, so yaw has only roundings: of sums up to 14 rad, and wraps.
+            // theta4 compensates the errors of theta1 and theta2, so yaw has only roundings: of sums up to 14 rad, and
+            // wraps.
             prop_assert!(turn_between(again.yaw, pose.yaw) <= 40.0 * U);
             prop_assert!(found.y == 0.0 || Elbow::of(&found) == elbow);
         }
     }
 
-    /// The position itself comes back, with its wrist turn, within what the posture's conditioning leaves.
+    /// The joint position itself is recovered, with its wrist turn, to the accuracy that the posture's conditioning
+    /// allows.
     #[test]
     fn inverse_of_forward_is_the_position(arm in real_arm(), q in position()) {
         let sine = f64::from(q.y).sin().abs();
@@ -99,9 +101,9 @@ proptest! {
         let pose = forward(&arm.geometry, &q);
         let closed = Vector3::new(pose.x, pose.y, pose.z);
         prop_assert!(f64::from((origin - closed).amax()) <= 2.0 * position_error(&arm));
-        // Entries of a product of rotations: 3.5 u each turn, and three sums each.
+        // Entries of a product of rotations: 3.5 u per turn, and three sums each.
         prop_assert!(f64::from((turn - rotation(&trig)).amax()) <= 40.0 * U);
-        // And so their angle; yaw is a sum up to 12 rad, wrapped.
+        // Likewise for their angle; yaw is a sum up to 12 rad, wrapped.
         prop_assert!(turn_between(turn.m21.atan2(turn.m11), pose.yaw) <= 80.0 * U);
     }
 
@@ -122,13 +124,13 @@ proptest! {
         prop_assert_eq!((angular.x, angular.y), (0.0, 0.0));
     }
 
-    /// A wrist solution is the nearest of its turns that the limits allow.
+    /// A wrist solution is the nearest turn that the limits allow.
     #[test]
     fn wrist_takes_the_nearest_turn(q in position(), near in -20.0..=20.0f32) {
         let arm = IRB_930;
         let pose = forward(&arm.geometry, &q);
         let hint = Vector4::new(0.0, 0.0, 0.0, near);
-        // Next to the stretched arm the shoulder may miss its limit by more than the tolerance.
+        // Close to the stretched arm the shoulder may exceed its limit by more than the tolerance.
         prop_assume!(q.y.abs() > 0.5);
         let found = inverse(&arm, &pose, Elbow::of(&q), &hint);
         let found = found.map_err(|error| TestCaseError::fail(error.to_string()))?;
@@ -144,7 +146,7 @@ proptest! {
         }
     }
 
-    /// An arm on a limit can be asked to stay where it is.
+    /// An arm at a limit can be commanded to stay where it is.
     #[test]
     fn pose_on_a_limit_has_a_solution(arm in real_arm(), inside in position(), on_upper: [bool; 4], which in 1..16u8) {
         let mut q = inside;
@@ -153,7 +155,7 @@ proptest! {
                 q[axis] = if on_upper[axis] { arm.limits.upper[axis] } else { arm.limits.lower[axis] };
             }
         }
-        // Next to the stretched arm the shoulder angle is not determined to the tolerance.
+        // Close to the stretched arm the shoulder angle is not determined to the tolerance.
         prop_assume!(q.y.abs() > 0.5);
         let pose = forward(&arm.geometry, &q);
         let found = inverse(&arm, &pose, Elbow::of(&q), &q);
@@ -162,7 +164,7 @@ proptest! {
         prop_assert!(is_within_limits(&arm, &found), "{found}");
     }
 
-    /// No input, of any bits, does anything but give a position within the limits or say why not.
+    /// Any input, of any bits, gives either a position within the limits or an error.
     #[test]
     fn inverse_is_total(x: u32, y: u32, z: u32, yaw: u32, near: u32, negative: bool) {
         let [x, y, z, yaw, near] = [x, y, z, yaw, near].map(f32::from_bits);
@@ -226,7 +228,7 @@ fn boundary_has_its_tolerance_and_no_more() {
     assert!(at(reach * (1.0 + 2.0 * REACH_TOLERANCE)).is_err());
 }
 
-/// Arms of one length can fold until the flange is on the shoulder axis, where theta1 is free: it is taken as it comes.
+/// Links of equal length can fold until the flange is on the shoulder axis, where theta1 is free: any value will do.
 #[test]
 fn equal_arms_reach_their_own_axis() {
     let mut geometry = IRB_930.geometry;

@@ -1,4 +1,4 @@
-//! The model's gate: good models pass, and every number that breaks its rule is named.
+//! Validation of models: good models pass, and every number that breaks its rule is named.
 
 mod common;
 

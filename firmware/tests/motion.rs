@@ -1,4 +1,4 @@
-//! Planned motion against the limits of the robot, judged by the recursive Newton-Euler dynamics that
+//! Planned motion against the limits of the robot, judged by the recursive Newton-Euler dynamics, which the
 //! planner does not use.
 
 use firmware::mechanics::arm::{ArmModel, IRB_930, Payload};
@@ -34,7 +34,7 @@ fn two_kg() -> Payload {
     }
 }
 
-/// Plans to the end; the number of ticks is bounded.
+/// Plans to the end within a bounded number of ticks.
 fn plan(
     arm: &ArmModel,
     payload: &Payload,
@@ -61,10 +61,10 @@ fn plan(
     panic!("not planned within {} steps", Planner::MAX_STEPS)
 }
 
-/// Walks a trajectory and holds every sample against every limit.
+/// Walks a trajectory and checks every sample against every limit.
 ///
-/// Samples lie eight times as dense as the planner's own, so what it could not see between two of
-/// its samples shows here: it must stay within what the planner holds back.
+/// The samples are eight times as dense as the planner's, so any excess between two of its samples shows here: it must
+/// stay within the planner's margin.
 fn check(arm: &ArmModel, payload: &Payload, trajectory: &Trajectory) -> Result<(), TestCaseError> {
     let body = Body::new(arm, payload);
     let duration = trajectory.duration();
@@ -106,13 +106,13 @@ fn check(arm: &ArmModel, payload: &Payload, trajectory: &Trajectory) -> Result<(
                 motor[axis]
             );
         }
-        // Positions, speeds and accelerations belong together: no jump between two samples.
+        // Positions, speeds and accelerations are consistent: no jump between two samples.
         if let Some((before, acceleration)) = previous {
             let h = duration / steps as f32;
             for axis in 0..4 {
                 let bound = arm.limits.velocity[axis] * h * slack + 1e-5;
                 prop_assert!((r.q[axis] - before[axis]).abs() <= bound);
-                // Jerk by differences: along a line the reference's own leaves a part out.
+                // Jerk by differences: along a line the reference omits a part of it.
                 // f32 accelerations of up to 600 rad/s^2, each off by some 20 u.
                 let jerk = (r.qdd[axis] - acceleration[axis]).abs() / h;
                 let noise = 20.0 * f32::EPSILON * arm.limits.acceleration[axis] / h;
@@ -159,7 +159,7 @@ proptest! {
         let target = Target::Jump { pose: pose(r1, a1), top, clearance };
         let Ok(trajectory) = plan(&IRB_930, &payload, &from, target, 1.0) else { return Ok(()) };
         check(&IRB_930, &payload, &trajectory)?;
-        // The gate: while the tool is lower than the clearance above its ends, it stands over them.
+        // The gate: while the tool is within the clearance above one of its ends, it is vertically above it.
         for i in 0..=400 {
             let t = trajectory.duration() * i as f32 / 400.0;
             let r = trajectory.at(&IRB_930, t).unwrap();
@@ -189,7 +189,7 @@ proptest! {
             let tool = kinematics::forward(&IRB_930.geometry, &r.q);
             let offset = Vector3::new(tool.x - x0, tool.y - y0, tool.z + 0.2);
             let aside = offset - along * (offset.dot(&along) / along.dot(&along).max(1e-9));
-            // f32 kinematics there and back: some 10 u of a metre.
+            // f32 kinematics there and back: about 10 u of a metre.
             let aside = aside.dot(&aside).sqrt();
             prop_assert!(aside < 2e-6, "{aside} aside");
         }
@@ -298,7 +298,7 @@ fn refusals_name_axis_value_and_limit() {
     assert_eq!(below.reason, RefusalReason::OutOfRange);
     let nan = refuse(Target::Joints(Vector4::new(f32::NAN, 0.0, 0.0, 0.0)));
     assert_eq!(nan.reason, RefusalReason::NotFinite);
-    // Through the stretched arm: both ends are fine, the way is not.
+    // Through the stretched arm: both ends are fine, but the path is not.
     let bent = Vector4::new(-0.4, 0.4, 0.1, 0.0);
     let start = kinematics::forward(&IRB_930.geometry, &bent);
     let across = Target::Line(Pose {
@@ -318,7 +318,7 @@ fn refusals_name_axis_value_and_limit() {
     assert!(plan(&IRB_930, &two_kg(), &bent, across, 1.0).is_ok());
     let fast = plan(&IRB_930, &two_kg(), &home, Target::Joints(home), 1.5).unwrap_err();
     assert_eq!(fast.reason, RefusalReason::OutOfRange);
-    // A payload that no lift of this robot can hold.
+    // A payload that the lift of this robot cannot hold.
     let anvil = Payload {
         mass: 90.0,
         ..two_kg()

@@ -1,7 +1,7 @@
-//! Codes that the protocol has and no node raises yet. The lists only ever get shorter.
+//! Codes of the protocol that no node raises yet. The lists only ever get shorter.
 //!
-//! A code counts as raised when the source of the node names it. Whether it is raised when it should be is for other tests
-//! to say; this one sees to it that the docs of a code do not promise more than there is.
+//! A code counts as raised when the source of the node names it. Whether it is raised when it should be is for other
+//! tests; this one makes sure that the docs of a code do not promise more than exists.
 
 use std::fs;
 use std::path::Path;
@@ -77,7 +77,7 @@ fn names(code: &str, path: &str) -> bool {
     })
 }
 
-/// Of all codes the reserved ones, and only they, are not raised and say so.
+/// Exactly the reserved codes are not raised, and their docs say so.
 fn check<T: Copy + std::fmt::Debug + PartialEq>(
     kind: &str,
     all: &[T],

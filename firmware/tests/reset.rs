@@ -1,4 +1,4 @@
-//! The record of the last stop, in memory that may hold anything.
+//! The record of the last stop in memory of arbitrary content.
 
 use firmware::cabinet::reset::{Record, Stop};
 use proptest::prelude::*;
@@ -37,7 +37,7 @@ proptest! {
         prop_assert_eq!(Record::from_words(garbage).take(), None);
     }
 
-    /// A reset in the middle of writing: the first words are of one stop, the rest of another.
+    /// A reset in the middle of writing: the first words belong to one stop, the rest to another.
     #[test]
     fn a_torn_record_is_none(old in any_stop(), new in any_stop(), written in 1_usize..4) {
         let mut words = words_of(&old);

@@ -1,4 +1,4 @@
-//! The state machine, walked over every state and every event, judged by what goes to the drives.
+//! The state machine: every state and every event, judged by the control word for the drives.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use protocol::time::Period;
 #[path = "common/table.rs"]
 mod table;
 
-/// The letters of [`EXPECTED`]: what goes to the drives.
+/// The letters of [`EXPECTED`]: control words for the drives.
 fn word(letter: char) -> ControlWord {
     let torque = ControlWord::TORQUE_ENABLE;
     let released = torque | ControlWord::BRAKE_RELEASE;
@@ -54,7 +54,8 @@ const COLUMNS: [Event; 15] = [
     Event::Reset,
 ];
 
-/// State, how it is reached, and what goes to the drives after each event. Written by hand: what the cabinet is to do.
+/// State, how it is reached, and the control word after each event. Written by hand: the intended behaviour of the
+/// cabinet.
 const EXPECTED: [(&str, &[Event], &str); 14] = {
     use Event::{
         AtRest, BrakeClosed, BrakeOpen, Disable, EmergencyStop, Enable, FaultOff, FaultStop,
@@ -170,8 +171,8 @@ fn name(state: State) -> &'static str {
     }
 }
 
-/// A controller that has seen these events. It takes the model at its word: no observer makes up for torques that the
-/// readings here do not have.
+/// A controller after these events. Without observer, which would compensate for the torques that are missing in the
+/// readings here.
 fn after(events: &[Event]) -> Controller {
     let mut config = Config::new(IRB_930, Period::of_rate(1000.0));
     config.setup.selection.compensation = Compensation::None;
@@ -229,7 +230,7 @@ fn every_state_is_walked() {
     assert_eq!(states, walked);
 }
 
-/// Whatever has happened, the next command carries the lift or has its brake closed: the weight of lift and shaft,
+/// Whatever has happened, the next command carries the lift or closes its brake: the weight of lift and shaft,
 /// 1.95 kg, on motor 3 is m g / (2 pi / 25 mm) = 0.076 N m.
 #[test]
 fn the_lift_never_falls() {
@@ -260,7 +261,7 @@ fn the_lift_never_falls() {
     }
 }
 
-/// A stop that has begun ends without torque, however it goes on.
+/// A stop that has begun ends without torque, however it proceeds.
 #[test]
 fn every_halt_ends_without_torque() {
     for (state, way, _) in EXPECTED {

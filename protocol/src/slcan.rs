@@ -97,7 +97,9 @@ impl fmt::Display for SlcanError {
             Self::WrongLength => f.write_str("line too long or too short for its command"),
             Self::NotHex { at } => write!(f, "not a hex digit at position {at}"),
             Self::IdOutOfRange(id) => write!(f, "identifier {id:#x} has too many bits"),
-            Self::OutOfRange(digit) => write!(f, "digit {digit} is greater than the command allows"),
+            Self::OutOfRange(digit) => {
+                write!(f, "digit {digit} is greater than the command allows")
+            }
             Self::TooLong => write!(f, "line of more than {} bytes", MAX_LINE + MAX_STAMP),
         }
     }

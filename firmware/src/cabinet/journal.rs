@@ -1,4 +1,4 @@
-//! What a controller writes into its log: why it was started, and every change of its mode. The same on every board.
+//! Log of a controller: why it was started, and every change of its mode. The same on every board.
 
 use protocol::messages::Mode;
 

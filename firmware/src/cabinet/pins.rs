@@ -1,12 +1,12 @@
 //! Pins of the drive cabinet, through embedded-hal: brake, safe torque off, stack light, e-stop.
 //!
-//! The pins show what mode and control word say and nothing else. Every output is written on every call, so
-//! that a glitch lasts one sample; wiring is fail-safe: a low pin brakes and takes torque away.
+//! The pins show mode and control word and nothing else. Every output is written on every call, so that
+//! a glitch lasts one sample. The wiring is fail-safe: a low pin brakes and switches torque off.
 
 use embedded_hal::digital::{InputPin, OutputPin};
 use protocol::messages::{ControlWord, Mode};
 
-/// Outputs of a controller that has failed: brake, torque, green, red, from bit 0 on.
+/// Outputs of a failed controller: brake, torque, green, red, from bit 0 on.
 pub const TORQUE_OFF: u8 = 0b1000;
 /// Outputs of a controller that moves the arm.
 pub const RUNNING: u8 = 0b0111;
@@ -26,7 +26,7 @@ pub struct Cabinet<Brake, Torque, Green, Red, EStop> {
     pub estop: EStop,
 }
 
-/// A pin did not take the level it was set to.
+/// A pin did not take the level that was set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PinFault;
@@ -43,7 +43,7 @@ where
     /// word, not the mode: while the brake closes after a fault, torque still holds the load.
     ///
     /// # Errors
-    /// [`PinFault`] if any pin failed; the others are written all the same.
+    /// [`PinFault`] if any pin failed; the others are written anyway.
     pub fn show(&mut self, mode: Mode, control: ControlWord) -> Result<(), PinFault> {
         let alarm = matches!(mode, Mode::FaultReaction | Mode::Fault | Mode::EStop);
         let brake_open = control.contains(ControlWord::BRAKE_RELEASE);

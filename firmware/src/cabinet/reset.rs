@@ -1,18 +1,18 @@
-//! What a controller that has to stop leaves behind for the one that starts after it.
+//! Record that a failing controller leaves for its restart.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use protocol::messages::ResetReason;
 
-/// How a controller has ended.
+/// How a controller ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stop {
-    /// What the next one gives as the reason of its start.
+    /// Reason of the next start.
     pub reason: ResetReason,
-    /// Outputs as they were found, and as they were read back once torque had been taken away, in the bits of
+    /// Outputs as found, and as read back after switching torque off, in the bits of
     /// [`TORQUE_OFF`](crate::cabinet::pins::TORQUE_OFF).
     pub pins: [u8; 2],
-    /// Address of the instruction that failed; 0 if there was none, or it is not known.
+    /// Address of the failing instruction; 0 if there was none or it is unknown.
     pub at: u32,
     /// Fault status of the core (CFSR of Armv7-M); 0 without a fault.
     pub status: u32,
@@ -31,11 +31,11 @@ impl Stop {
     }
 }
 
-/// Seed of the check word, so that memory full of one value does not pass as a record.
+/// Seed of the check word, so that memory filled with one value does not pass as a record.
 const SEED: u32 = 0x5CA7_A571;
 
-/// A [`Stop`] in memory that a reset leaves alone. After power-on anything may be in it, and a reset may come in the
-/// middle of writing: what is not whole is nothing.
+/// A [`Stop`] in memory that a reset preserves. After power-on it may hold anything, and a reset may interrupt writing:
+/// an incomplete record counts as none.
 #[derive(Debug)]
 pub struct Record([AtomicU32; 4]);
 
@@ -66,7 +66,7 @@ impl Record {
         }
     }
 
-    /// Takes what has been kept, once: the reset after this one has a reason of its own.
+    /// Takes the kept record, once: the next reset will have its own reason.
     pub fn take(&self) -> Option<Stop> {
         let [cause, at, status, word] =
             self.0.each_ref().map(|place| place.load(Ordering::Relaxed));

@@ -1,8 +1,8 @@
 //! Time counted in samples of the drives, for lock-step.
 //!
 //! In lock-step the drives wait for each command, so a sample takes as long as the slowest participant needs, and no
-//! clock of the real world tells the time of the run. This one does: every feedback frame moves it on by the samples
-//! that its number says have passed. Two controllers that are given the same frames then send the same frames, on any
+//! real clock gives the time of the run. This one does: every feedback frame advances it by the samples that have
+//! passed according to its number. Two controllers that receive the same frames thus send the same frames, on any
 //! machine and at any speed.
 
 use protocol::codec;
@@ -11,7 +11,7 @@ use protocol::messages::Message;
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
 
-/// Most samples that one feedback frame may move the clock on, 1000 s at 1 kHz: more is not a gap but another run.
+/// Most samples by which one feedback frame may advance the clock, 1000 s at 1 kHz: more is not a gap but another run.
 const MAX_STEP: u32 = 1_000_000;
 
 /// The clock of a controller in lock-step.
@@ -19,7 +19,7 @@ const MAX_STEP: u32 = 1_000_000;
 pub struct SampleClock {
     period: Period,
     now: Instant,
-    /// Number of the newest sample, and when it came.
+    /// Number of the newest sample, and its time.
     newest: Option<(u32, Instant)>,
 }
 
@@ -33,14 +33,14 @@ impl SampleClock {
         }
     }
 
-    /// Present time: what [`Node::poll`](crate::node::Node::poll) takes.
+    /// Present time, for [`Node::poll`](crate::node::Node::poll).
     pub const fn now(&self) -> Instant {
         self.now
     }
 
-    /// Looks at a frame that has just come, before the node does; `true` if it has moved time on. The node is then called
-    /// without the frame first, for what has become due: no call is long for both. A feedback frame that is older than the
-    /// last, or from drives that have started again, does not turn the clock back.
+    /// Looks at a frame that has just arrived, before the node does; `true` if it has advanced the time. The node is
+    /// then first called without the frame, for whatever is due, so that no call does both. A feedback frame that is
+    /// older than the last, or from restarted drives, does not turn the clock back.
     pub fn observe(&mut self, frame: &CanFrame) -> bool {
         let before = self.now;
         if table::FEEDBACK.identifies(frame)
@@ -50,7 +50,7 @@ impl SampleClock {
             if let Some((last, at)) = self.newest {
                 let step = feedback.sample.wrapping_sub(last);
                 if step <= MAX_STEP {
-                    // What has elapsed without a sample since then is not counted twice.
+                    // Time already elapsed without a sample is not counted twice.
                     self.now = self.now.max(at + self.period.duration() * step);
                 }
             }
@@ -84,7 +84,7 @@ mod tests {
     #[test]
     fn time_is_the_number_of_samples_and_never_runs_backwards() {
         let mut clock = SampleClock::new(Period::of_rate(1000.0));
-        // Sample seen, time expected in samples: gaps count, old samples and a restart do not.
+        // Sample number, expected time in samples: gaps count, old samples and a restart do not.
         for (sample, expected) in [(7, 0), (8, 1), (11, 4), (10, 4), (12, 6), (0, 6), (1, 7)] {
             clock.observe(&feedback(sample));
             assert_eq!(

@@ -1,8 +1,8 @@
-//! What the controller knows of the arm it drives: geometry, links, limits, drive train, payload.
+//! The controller's model of its arm: geometry, links, limits, drive train, payload.
 //!
 //! Plain data with public fields, so that a robot is a constant, and serialisable, so that a robot can be sent to the
-//! controller of a board. [`ArmModel::validate`] is the gate: past it, the
-//! kinematics and dynamics of this crate have no division by zero and every mass matrix is positive definite.
+//! controller of a board. For any model that passes [`ArmModel::validate`], the
+//! kinematics and dynamics of this crate never divide by zero and every mass matrix is positive definite.
 
 mod validate;
 
@@ -45,14 +45,14 @@ impl Axis {
 pub struct Link {
     /// Mass (kg).
     pub mass: f32,
-    /// Centre of mass (m) in the joint frame: the frame that moves with the link and sits on the axis that drives it. Frames 1
+    /// Centre of mass (m) in the joint frame: the frame that moves with the link, on the axis that drives it. Frames 1
     /// and 2 have z up, frames 3 and 4 z down; x points along the arm.
     pub com: Vector3<f32>,
     /// Principal moments of inertia about the centre of mass (kg m^2), axes parallel to the joint frame.
     pub inertia: Vector3<f32>,
 }
 
-/// Lengths of the Denavit-Hartenberg table (paper, table 1). The twists, 0, pi, 0, 0, are what makes a SCARA and are
+/// Lengths of the Denavit-Hartenberg table (paper, table 1). The twists 0, pi, 0, 0 define a SCARA and are
 /// built in.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Geometry {
@@ -60,7 +60,7 @@ pub struct Geometry {
     pub a1: f32,
     /// Length of arm 2 (m).
     pub a2: f32,
-    /// Height of the arm plane over the origin of frame 0 (m): the offsets of joints 1 and 2 together.
+    /// Height of the arm plane above the origin of frame 0 (m): the offsets of joints 1 and 2 together.
     pub d1: f32,
     /// Distance of the flange below the arm plane with the lift at zero (m).
     pub d4: f32,
@@ -89,8 +89,8 @@ pub struct JointLimits {
     pub jerk: Vector4<f32>,
     /// Greatest effort (N m, lift N).
     pub effort: Vector4<f32>,
-    /// Continuous effort (N m, lift N), as a root mean square. Checked and stored only: it waits for a thermal model of the
-    /// motors; until then no law or plan looks at it.
+    /// Continuous effort (N m, lift N), as a root mean square. Only checked and stored, for a future thermal model of
+    /// the motors; no law or plan uses it yet.
     pub effort_continuous: Vector4<f32>,
 }
 
@@ -127,7 +127,7 @@ pub struct DriveTrain {
 pub struct Payload {
     /// Mass (kg); zero for an empty flange.
     pub mass: f32,
-    /// Centre of mass in the flange frame (m): z down, off the shaft by x and y.
+    /// Centre of mass in the flange frame (m), z down.
     pub com: Vector3<f32>,
     /// Principal moments of inertia about the centre of mass (kg m^2), axes parallel to the flange frame.
     pub inertia: Vector3<f32>,
@@ -142,7 +142,7 @@ impl Payload {
     };
 }
 
-/// Everything the controller knows of an arm.
+/// Everything that the controller knows about an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ArmModel {
     /// Lengths.
@@ -159,7 +159,8 @@ pub struct ArmModel {
     pub payload_max: f32,
 }
 
-/// ABB IRB 930-22/1.05: 22 kg at 1.05 m. Lengths after the manufacturer's drawings; masses, motors and gears are estimates.
+/// ABB IRB 930-22/1.05: 22 kg at 1.05 m. Lengths from the manufacturer's drawings; masses, motors and gears are
+/// estimates.
 pub const IRB_930: ArmModel = ArmModel {
     geometry: Geometry {
         a1: 0.56,

@@ -10,7 +10,7 @@ use crate::mechanics::dynamics::drive::Drive;
 use crate::mechanics::dynamics::lagrange::Lagrange;
 use crate::mechanics::kinematics::Trig;
 
-/// Everything that depends on the payload, lumped once so that a tick does not repeat it.
+/// Everything that depends on the payload, lumped once instead of in every tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Body {
     /// Rigid links with payload.
@@ -19,7 +19,7 @@ pub struct Body {
     pub drive: Drive,
     /// Rotor inertia seen at the joints, A^T Jm A.
     rotor: Matrix4<f32>,
-    /// Inertia of each axis by itself at a square elbow: what laws without a model scale with.
+    /// Inertia of each axis by itself with the elbow at a right angle, for laws without a model.
     pub nominal_inertia: Vector4<f32>,
 }
 

@@ -1,8 +1,8 @@
-//! Differential kinematics: joint speeds to tool velocity and back, and what is left of it near the singularity.
+//! Differential kinematics: joint speeds to tool velocity and back, damped near the singularity.
 //!
-//! A SCARA has one inner singularity in reach, the stretched arm (theta2 = 0), and it lives in the 2 x 2 block that takes
-//! the speeds of shoulder and elbow to the horizontal velocity. The rest of the Jacobian is 1 and -1. So that block is
-//! all a [`Jacobian`] holds.
+//! A SCARA has one singularity in reach, the stretched arm (theta2 = 0), and it is in the 2 x 2 block that maps the
+//! speeds of shoulder and elbow to the horizontal velocity. The other nonzero elements are 1 and -1, so a [`Jacobian`]
+//! holds that block alone.
 
 use nalgebra::{Matrix4, Matrix6x4, Vector4};
 
@@ -12,13 +12,14 @@ use crate::mechanics::math::sqrt;
 
 /// Least |sin theta2| at which the plain inverse is defined: 0.06 degrees from the stretched arm.
 ///
-/// `sin theta2` carries an error of 2.5 u whatever its size, so that below this the inverse has lost more than 1.5e-4 of
-/// itself, and the joint speeds it asks for are a thousand times the ordinary ones anyway.
+/// `sin theta2` has an absolute error of 2.5 u, so below this the relative error of the inverse exceeds 1.5e-4, and the
+/// joint speeds are a thousand times the ordinary ones anyway.
 pub const SINGULAR_SINE: f32 = 1e-3;
 
-/// Where damping of the inverse sets in: at a least singular value of this fraction of the stretched arm's length.
+/// Damping of the inverse sets in where the least singular value falls below this fraction of the stretched arm's
+/// length.
 ///
-/// For the IRB 930 that is 7.6 degrees from the stretched arm; beyond it the damped inverse is the inverse.
+/// For the IRB 930 that is 7.6 degrees from the stretched arm; farther away the damped inverse is the inverse.
 pub const DAMPING_ONSET: f32 = 0.03;
 
 /// The Jacobian of the flange at one joint position, in frame 0 (paper, eq. 20 to 27).
@@ -38,14 +39,14 @@ pub struct Jacobian {
     y2: f32,
     /// sin theta2.
     s2: f32,
-    /// a1 a2 sin theta2, which has none of the cancellation of x1 y2 - x2 y1 (m^2).
+    /// a1 a2 sin theta2, without the cancellation in x1 y2 - x2 y1 (m^2).
     determinant: f32,
     /// The least singular value at which the inverse is not damped (m).
     onset: f32,
 }
 
 impl Jacobian {
-    /// The Jacobian of an arm of this geometry at the joint position behind `trig`.
+    /// The Jacobian of an arm of this geometry at the joint position of `trig`.
     #[must_use]
     pub fn new(geometry: &Geometry, trig: &Trig) -> Self {
         let (x2, y2) = (-geometry.a2 * trig.s12, geometry.a2 * trig.c12);
@@ -91,7 +92,7 @@ impl Jacobian {
         jacobian
     }
 
-    /// Where the flange is, in x and y of frame 0 (m): two elements of the Jacobian say so.
+    /// Position of the flange in x and y of frame 0 (m), from two elements of the Jacobian.
     #[must_use]
     pub fn position(&self) -> (f32, f32) {
         (self.y1, -self.x1)
@@ -109,8 +110,8 @@ impl Jacobian {
         self.x1 * self.x1 + self.x2 * self.x2 + self.y1 * self.y1 + self.y2 * self.y2
     }
 
-    /// Singular values of the planar block, the greater first (m): the greatest and the least horizontal speed of
-    /// the flange for speeds of shoulder and elbow on the unit circle.
+    /// Singular values of the planar block, the greater first (m): greatest and least horizontal speed of the flange
+    /// for speeds of shoulder and elbow on the unit circle.
     ///
     /// Paper function; not on the control path.
     #[must_use]
@@ -152,7 +153,7 @@ impl Jacobian {
         rate
     }
 
-    /// Task acceleration at joint speeds `qd` without any joint acceleration: the rate of the Jacobian times `qd`, at the
+    /// Task acceleration at joint speeds `qd` and zero joint acceleration: the rate of the Jacobian times `qd`, at the
     /// actual position and speed. (The paper's eq. 49 takes the desired ones.)
     #[must_use]
     pub fn bias(&self, qd: &Vector4<f32>) -> Vector4<f32> {
@@ -167,7 +168,7 @@ impl Jacobian {
         )
     }
 
-    /// Inverse differential kinematics: joint speeds for a task velocity (paper, eq. 21); likewise joint accelerations for
+    /// Inverse differential kinematics: joint speeds for a task velocity (paper, eq. 21); also joint accelerations for
     /// `task acceleration - bias`. `None` within [`SINGULAR_SINE`] of the stretched or folded arm.
     #[must_use]
     pub fn joint_speed(&self, v: &Vector4<f32>) -> Option<Vector4<f32>> {
@@ -192,8 +193,8 @@ impl Jacobian {
 
     /// Square of the damping (m^2): zero beyond [`DAMPING_ONSET`], growing to a quarter of the squared onset at the singularity.
     ///
-    /// It takes `det^2 / (s_max^2 + s_min^2)` for the square of the least singular value. That is never more and, where damping
-    /// acts, hardly less, and it costs a division where the value itself costs two roots.
+    /// It uses `det^2 / (s_max^2 + s_min^2)` for the square of the least singular value. That is never greater and,
+    /// where damping acts, hardly less, and it costs a division instead of two roots.
     fn damping_squared(&self) -> f32 {
         let least_squared = self.determinant * self.determinant / self.norm_squared();
         let onset_squared = self.onset * self.onset;
@@ -209,8 +210,8 @@ impl Jacobian {
     /// Damped least squares (Nakamura and Hanafusa 1986) on the planar block with a damping that grows towards the
     /// singularity (after Maciejewski and Klein 1988). Writing e for the onset, the gain `s / (s^2 + (e^2 - s^2) / 4)` of a
     /// singular value s is greatest at `s = e / sqrt 3`, so that the speeds of shoulder and elbow never exceed
-    /// `1.155 / e` times the horizontal velocity (37 rad/s per m/s for the IRB 930). The flange slows down or leaves the wanted
-    /// direction instead. The wrist follows the damped speeds, so yaw and height stay exact.
+    /// `1.155 / e` times the horizontal velocity (37 rad/s per m/s for the IRB 930). The flange slows down or deviates
+    /// from the desired direction instead. The wrist follows the damped speeds, so yaw and height stay exact.
     #[must_use]
     pub fn joint_speed_damped(&self, v: &Vector4<f32>) -> Vector4<f32> {
         let Self {

@@ -9,7 +9,7 @@ use crate::mechanics::math::{sin_cos, wrap};
 
 pub use ik::{Elbow, IkError, LIMIT_TOLERANCE, REACH_TOLERANCE, inverse, solve};
 
-/// Sines and cosines of one joint position, computed once a tick and shared by everything that needs them.
+/// Sines and cosines of one joint position, computed once per tick and shared by everything that needs them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trig {
     /// sin theta1.
@@ -33,17 +33,17 @@ pub struct Trig {
 impl Trig {
     /// Evaluates the functions at joint position `q` (rad, m).
     ///
-    /// Error in units of u = 2^-24: 2.5 for the single angles ([`sin_cos`]); 9.1 for the sum, which is 2.5 times the sum of
-    /// the four magnitudes (at most 2 sqrt 2) and 2 for rounding products and sum. The addition theorem costs a fifth of
-    /// another `sin_cos`, and is no worse than rounding theta1 + theta2 would be.
+    /// Error in units of u = 2^-24: 2.5 for the single angles ([`sin_cos`]); 9.1 for the sum, which is 2.5 times the
+    /// sum of the four magnitudes (at most 2 sqrt 2) plus 2 for rounding products and sum. The addition theorem costs a
+    /// fifth of another `sin_cos`, and is no less accurate than rounding theta1 + theta2.
     #[inline(never)]
     #[must_use]
     pub fn new(q: &Vector4<f32>) -> Self {
         Self::in_line(q)
     }
 
-    /// Inlined variant of [`Trig::new`]: components that the caller does not use are optimised away. Dynamics never ask
-    /// for theta1.
+    /// Inlined variant of [`Trig::new`]: components that the caller does not use are optimised away. Dynamics never
+    /// need theta1.
     #[inline(always)]
     #[must_use]
     pub fn in_line(q: &Vector4<f32>) -> Self {
@@ -63,7 +63,7 @@ impl Trig {
     }
 }
 
-/// Where the tool flange is: its origin in frame 0 (m) and its yaw about z (rad). Its z axis points down, always.
+/// Pose of the tool flange: its origin in frame 0 (m) and its yaw about z (rad). Its z axis always points down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Along x of frame 0 (m).
@@ -82,7 +82,7 @@ pub fn forward(geometry: &Geometry, q: &Vector4<f32>) -> Pose {
     forward_with(geometry, &Trig::new(q), q)
 }
 
-/// As [`forward`], for a caller that has the sines and cosines of `q` already.
+/// Like [`forward`], for a caller that already has the sines and cosines of `q`.
 #[must_use]
 pub fn forward_with(geometry: &Geometry, trig: &Trig, q: &Vector4<f32>) -> Pose {
     Pose {
@@ -93,7 +93,7 @@ pub fn forward_with(geometry: &Geometry, trig: &Trig, q: &Vector4<f32>) -> Pose 
     }
 }
 
-/// Orientation of the flange: the matrix that turns components in frame 4 into components in frame 0 (paper, eq. 8 to 19).
+/// Orientation of the flange: the matrix that maps components in frame 4 to components in frame 0 (paper, eq. 8 to 19).
 #[must_use]
 pub fn rotation(trig: &Trig) -> Matrix3<f32> {
     let c = trig.c12 * trig.c4 + trig.s12 * trig.s4;
@@ -106,7 +106,7 @@ pub fn rotation(trig: &Trig) -> Matrix3<f32> {
 /// The paper's eq. 4 prints +1 for the last diagonal element of the second rotation, a reflection; a half turn about x has -1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkFrame {
-    /// Turns components in frame i into components in frame i - 1.
+    /// Maps components in frame i to components in frame i - 1.
     pub rotation: Matrix3<f32>,
     /// From the origin of frame i - 1 to that of frame i, components in frame i (m).
     pub offset: Vector3<f32>,

@@ -1,7 +1,7 @@
 //! The elementary functions: the only source of `sin`, `cos`, `sqrt`, `cbrt`, `atan2` and `tanh` in the controller.
 //!
 //! Everything here is built from IEEE 754 `+ - * /`, comparisons and bit moves in `f32`, so host, emulator and silicon
-//! give the same bits. Every function is total; a NaN goes in and a NaN comes out.
+//! give the same bits. Every function is total; NaN in gives NaN out.
 //!
 //! `u` = 2^-24 below is the unit roundoff of `f32`.
 
@@ -11,20 +11,20 @@ use core::f32::consts::{FRAC_2_PI, PI, TAU};
 /// instruction, and leaves that integer, modulo a power of two, in the low bits of the sum.
 const ROUND: f32 = 12_582_912.0;
 
-/// Largest magnitude (rad) that the three-part reductions below carry without loss: quotients stay below 2^13, so that
-/// a quotient times a part of 11 bits is exact.
+/// Largest magnitude (rad) for which the three-part reductions below are exact: quotients stay below 2^13, so that a
+/// quotient times a part of 11 bits is exact.
 const REDUCTION_RANGE: f32 = 8192.0;
 
 /// pi/2 in three parts (Cody and Waite 1980): 11 bits, 11 bits, the rest. They sum to pi/2 within 2e-15.
 const HALF_PI: [f32; 3] = [1.570_312_5, 4.837_513e-4, 7.549_79e-8];
 
-/// 2 pi in three parts, as [`HALF_PI`].
+/// 2 pi in three parts, like [`HALF_PI`].
 const TWO_PI: [f32; 3] = [6.281_25, 1.935_005_2e-3, 3.019_916e-7];
 
 /// Brings a finite angle (rad) into the range of the three-part reductions.
 ///
-/// Beyond that range the period is the `f32` nearest to 2 pi: it is off by 2.8e-8 relative, so the phase it loses is
-/// less than half the spacing of `f32` at the angle itself. No joint of any arm gets there.
+/// Beyond that range the period is the `f32` nearest to 2 pi: its relative error is 2.8e-8, so the phase error is
+/// less than half the spacing of `f32` at the angle itself. No joint of any arm turns that far.
 fn fold(angle: f32) -> f32 {
     if angle.abs() <= REDUCTION_RANGE {
         angle
@@ -84,9 +84,9 @@ pub fn sqrt(x: f32) -> f32 {
 
 /// Cube root, error at most 2 u relative for |x| up to 2^126; a subnormal number counts as zero.
 ///
-/// A third of the exponent gives five bits (the start of FreeBSD's `cbrtf`); each of Halley's steps gives three times as
-/// many. The error is that of the last sum (1 u) and a third of that of the cube (2 u). `libm` takes the same steps in
-/// `f64`, which is software on an M4F.
+/// A third of the exponent gives five bits (the start of FreeBSD's `cbrtf`); each Halley step triples them. The error
+/// is that of the last sum (1 u) plus a third of that of the cube (2 u). `libm` takes the same steps in `f64`, which is
+/// emulated in software on an M4F.
 #[must_use]
 pub fn cbrt(x: f32) -> f32 {
     let size = x.abs();
@@ -114,7 +114,7 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     libm::atan2f(y, x)
 }
 
-/// The angle (rad) without whole turns, in (-pi, pi]. An angle already there comes back unchanged, to the bit.
+/// The angle (rad) without whole turns, in (-pi, pi]. An angle already in that range is returned unchanged, to the bit.
 ///
 /// Error at most 2 u pi for |angle| <= 8192 rad; beyond, see the phase error of the reduction. NaN for an infinity or NaN.
 #[must_use]
@@ -122,7 +122,7 @@ pub fn wrap(angle: f32) -> f32 {
     let angle = fold(angle);
     let turns = (angle * (1.0 / TAU) + ROUND) - ROUND;
     let r = reduce(angle, turns, TWO_PI);
-    // The quotient is rounded: next to half a turn it may pick the neighbour.
+    // The quotient is rounded: close to half a turn it may be off by one.
     if r > PI {
         r - TAU
     } else if r <= -PI {
@@ -134,12 +134,12 @@ pub fn wrap(angle: f32) -> f32 {
 
 /// Hyperbolic tangent, error at most 1.5e-6 everywhere, odd, never outside [-1, 1].
 ///
-/// It smooths Coulomb friction, where a millionth of the friction level is nothing; a rational minimax of degree 7 over 8
-/// costs one division and no exponential. The error is 1.3e-7 of the fit on [-8, 8], 2.3e-7 = 1 - tanh 8 beyond, and
-/// 17 u of rounding (two roundings a Horner step, numerator and denominator).
+/// It smooths Coulomb friction, where a millionth of the friction level is negligible; a rational minimax of degree 7
+/// over 8 costs one division and no exponential. The error is 1.3e-7 of the fit on [-8, 8], 2.3e-7 = 1 - tanh 8 beyond,
+/// and 17 u of rounding (two roundings per Horner step, numerator and denominator).
 #[must_use]
 pub fn tanh(x: f32) -> f32 {
-    // At any speed worth the name friction is fully built up.
+    // At any relevant speed friction is fully built up.
     if x.abs() >= 8.0 {
         return 1.0_f32.copysign(x);
     }
@@ -150,10 +150,10 @@ pub fn tanh(x: f32) -> f32 {
     clamp(x * p / q, -1.0, 1.0)
 }
 
-/// `x` limited to [`lower`, `upper`]; a NaN stays one.
+/// `x` limited to [`lower`, `upper`]; NaN stays NaN.
 ///
-/// Unlike `f32::clamp` it has no panic for crossed limits (the lower one wins), and unlike `f32::min` and `max` it is a
-/// compare and a move on an FPU without those instructions.
+/// Unlike `f32::clamp` it does not panic for crossed limits (the lower one wins), and unlike `f32::min` and `max` it is
+/// a compare and a move on an FPU without instructions for those.
 #[must_use]
 pub fn clamp(x: f32, lower: f32, upper: f32) -> f32 {
     let x = if x > upper { upper } else { x };

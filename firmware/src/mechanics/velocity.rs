@@ -1,9 +1,9 @@
 //! Velocity propagation: the velocities of all link frames, from the base outwards.
 //!
-//! The paper's eq. 30 to 33 turn the joint rate about the axis of the new frame, which is right for Craig's modified
+//! The paper's eq. 30 to 33 apply the joint rate about the axis of the new frame, which is right for Craig's modified
 //! Denavit-Hartenberg frames. The arm's table is the standard one, where joint i + 1 turns about z of frame i. With the
-//! half turn between frames 1 and 2 the difference flips signs (eq. 34 to 39 as printed), so the joint rate enters here
-//! before the vector is carried into the new frame.
+//! half turn between frames 1 and 2 the difference flips signs (eq. 34 to 39 as printed), so here the joint rate is
+//! added before the vector is transformed to the new frame.
 //!
 //! Paper functions; not on the control path, which takes tool velocities from the Jacobian.
 
@@ -26,7 +26,7 @@ impl LinkVelocity {
         linear: Vector3::new(0.0, 0.0, 0.0),
     };
 
-    /// The next frame, turned about z of this one at `rate` (eq. 30 and 32, put right).
+    /// The next frame, turning about z of this one at `rate` (eq. 30 and 32, corrected).
     fn revolute(&self, frame: &LinkFrame, rate: f32) -> Self {
         let angular = frame.carry(&(self.angular + Vector3::new(0.0, 0.0, rate)));
         Self {
@@ -35,7 +35,7 @@ impl LinkVelocity {
         }
     }
 
-    /// The next frame, moved along z of this one at `rate` (eq. 31 and 33, put right).
+    /// The next frame, moving along z of this one at `rate` (eq. 31 and 33, corrected).
     fn prismatic(&self, frame: &LinkFrame, rate: f32) -> Self {
         let angular = frame.carry(&self.angular);
         let linear = frame.carry(&(self.linear + Vector3::new(0.0, 0.0, rate)));

@@ -1,4 +1,4 @@
-//! Parameter requests: answered here, or passed on to the drives.
+//! Parameter requests: answered here or forwarded to the drives.
 
 use protocol::bus::Transmit;
 use protocol::e2e::Verdict;
@@ -8,7 +8,7 @@ use protocol::table;
 
 use super::Node;
 
-/// Last number that is answered here.
+/// Last parameter number that is answered here.
 const LAST: u16 = {
     let [.., last] = ControllerParameter::ALL else {
         panic!("the controller has parameters")
@@ -17,8 +17,8 @@ const LAST: u16 = {
 };
 
 impl Node {
-    /// Answers a request of the operator, or passes it on. One frame either way.
-    // Out of line, as the next: rarely reached, and it would take registers from a sample.
+    /// Answers a request of the operator or forwards it. One frame either way.
+    // Out of line, like the next: rarely reached, and it would take registers from a sample.
     #[inline(never)]
     pub(super) fn parameter<B: Transmit>(
         &mut self,
@@ -56,7 +56,7 @@ impl Node {
         self.reply_parameter(reply, bus);
     }
 
-    /// The drives answer later, or never: nothing waits for them here.
+    /// Forwards a request; the drives answer later or never, and nothing waits for them here.
     fn ask_drives<B: Transmit>(&mut self, index: u16, request: &ParameterRequest, bus: &mut B) {
         if self.newest.is_none() {
             let silent = ParameterReply::Error {
@@ -69,7 +69,7 @@ impl Node {
         self.send(&Message::ParameterRequest(Server::Drives, *request), bus);
     }
 
-    /// Hands on what the drives, or this controller, answer.
+    /// Sends an answer of the drives or of this controller.
     #[inline(never)]
     pub(super) fn reply_parameter<B: Transmit>(&mut self, reply: ParameterReply, bus: &mut B) {
         self.send(&Message::ParameterReply(Server::Controller, reply), bus);

@@ -1,9 +1,9 @@
-//! What an error in the dynamics is measured against.
+//! Reference magnitude for errors in the dynamics.
 //!
-//! The result of an f32 computation is off by a number of roundings times u = 2^-24 times the sum of the magnitudes of
-//! its terms, not times the result, in which they may cancel. [`effort`] is that sum for the joint efforts: the Newton-Euler
-//! recursion carried out on lengths. A turn leaves a length alone, so every horizontal vector is replaced by its length,
-//! every sum by the sum of lengths, every product by the product of lengths.
+//! The error of an f32 computation is a number of roundings times u = 2^-24 times the sum of the magnitudes of its
+//! terms, not times the result, in which they may cancel. [`effort`] is that sum for the joint efforts: the
+//! Newton-Euler recursion carried out on lengths. Rotation preserves length, so every horizontal vector is replaced by
+//! its length, every sum by the sum of lengths, every product by the product of lengths.
 //!
 //! Roundings on the longest path, from a joint acceleration at the base out to the tool and back:
 //!
@@ -29,7 +29,7 @@ pub(crate) const LAGRANGE: f64 = 46.0;
 struct Body {
     mass: f64,
     inertia: f64,
-    /// Distance of the centre of mass from the origin of its frame, as sum of what it is computed from.
+    /// Distance of the centre of mass from the origin of its frame, as the sum of the terms it is computed from.
     distance: f64,
 }
 
@@ -83,7 +83,7 @@ pub(crate) fn effort(
         }
     }
 
-    // Inwards: what each joint carries.
+    // Inwards: load carried by each joint.
     let (mut carried_force, mut carried_moment) = (0.0, 0.0);
     let mut effort = Vector4::zeros();
     for i in (0..4).rev() {
@@ -104,7 +104,7 @@ pub(crate) fn mass_matrix(arm: &ArmModel, payload: &Payload) -> Matrix4<f64> {
         let mut unit = Vector4::zeros();
         unit[joint] = 1.0;
         let mut column = effort(arm, payload, 0.0, &Vector4::zeros(), &unit);
-        // The lift and the turning joints do not meet.
+        // The lift and the turning joints are not coupled.
         if joint != 2 {
             column.z = 0.0;
         }

@@ -1,4 +1,4 @@
-//! Shared by the tests of the mathematics: random arms and positions, and what they measure errors in.
+//! Shared by the tests of the mathematics: random arms and positions, and units of error.
 #![allow(dead_code)] // Each test binary uses its own part.
 
 pub(crate) mod magnitude;
@@ -7,10 +7,10 @@ use firmware::mechanics::arm::{ArmModel, Geometry, IRB_930, Link, Payload};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 
-/// Unit roundoff of f32, as the doc comments use it.
+/// Unit roundoff of f32, as in the doc comments.
 pub(crate) const U: f64 = 1.0 / (1u32 << 24) as f64;
 
-/// The short sister of the IRB 930: 12 kg at 0.85 m.
+/// The short variant of the IRB 930: 12 kg at 0.85 m.
 pub(crate) fn irb_930_short() -> ArmModel {
     let mut arm = IRB_930;
     arm.geometry.a1 = 0.36;
@@ -80,7 +80,7 @@ pub(crate) fn payload() -> impl Strategy<Value = Payload> {
     prop_oneof![1 => Just(Payload::NONE), 4 => held]
 }
 
-/// An arm with links of any length, centres of mass off their axes and heights off the plane; or one of the two real ones.
+/// An arm with links of any length, and centres of mass off axis and off plane; or one of the two real ones.
 pub(crate) fn arm() -> impl Strategy<Value = ArmModel> {
     let lengths = (0.05..=1.2f32, 0.05..=1.2f32, -0.5..=0.5f32, -0.5..=0.5f32);
     let links = [link(), link(), link(), link()];

@@ -1,8 +1,8 @@
-//! Parts of `docs/safety.md` that are made from the code.
+//! Parts of `docs/safety.md` that are generated from the code.
 
 use std::path::Path;
 
-/// Compares the part called `name`, between its two marks, with `text`. With `UPDATE_DOCS` set it is written instead.
+/// Compares the part `name`, between its two marks, with `text`; with `UPDATE_DOCS` set, writes it instead.
 #[track_caller]
 pub(crate) fn compare(name: &str, text: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/safety.md");

@@ -1,4 +1,4 @@
-//! A node on a bus of the test's own.
+//! A node on a simulated bus.
 
 use std::collections::VecDeque;
 
@@ -18,7 +18,7 @@ use protocol::table;
 use protocol::time::{Duration, Instant, Period};
 
 pub(crate) const PERIOD: Period = Period::of_rate(1000.0);
-/// Past any watchdog of the drives.
+/// Longer than any watchdog of the drives.
 pub(crate) const SILENCE: Duration = Duration::from_nanos(PEER_TIMEOUT.nanos() + 1_000);
 
 #[derive(Default)]
@@ -38,7 +38,7 @@ impl Transmit for Wire {
     }
 }
 
-/// A node, and an arm that stands still whatever the command; unless it `follows`, and is where the node wants it.
+/// A node and an arm that stays still whatever the command, unless it `follows`: then it is at the node's reference.
 pub(crate) struct Bench {
     pub node: Node,
     pub wire: Wire,
@@ -80,13 +80,13 @@ impl Bench {
         bench
     }
 
-    /// Puts the arm there.
+    /// Puts the arm at this joint position.
     pub(crate) fn put(&mut self, q: &Vector4<f32>) {
         let angle = self.drive.motor_angle(q);
         self.position = self.drive.counts_of_motor_angle(&angle);
     }
 
-    /// A bench whose axes are under torque.
+    /// A bench with torque on.
     pub(crate) fn enabled() -> Self {
         let mut bench = Self::new();
         bench.enable();
@@ -102,7 +102,7 @@ impl Bench {
         self.run(100);
     }
 
-    /// A bench whose arm is in the middle of a fast move.
+    /// A bench in the middle of a fast move.
     pub(crate) fn moving() -> Self {
         let mut bench = Self::enabled();
         bench.follows = true;
@@ -143,7 +143,7 @@ impl Bench {
         frame
     }
 
-    /// Hands over what has been put on the wire, frame by frame, or only the time.
+    /// Hands the pending frames to the node one by one, or only the time if there are none.
     pub(crate) fn poll(&mut self) -> Vec<Message> {
         let mut received = self.wire.to_node.pop_front();
         loop {
@@ -160,7 +160,7 @@ impl Bench {
             .collect()
     }
 
-    /// One sample with what has been put on the wire; returns what the node sent.
+    /// One sample with the pending frames; returns what the node sent.
     pub(crate) fn step(&mut self) -> Vec<Message> {
         self.now += self.period;
         let frame = self.next_feedback();
@@ -181,12 +181,12 @@ impl Bench {
                 _ => None,
             })
             .collect();
-        assert_eq!(commands.len(), 1, "one command a feedback: {sent:?}");
+        assert_eq!(commands.len(), 1, "one command per feedback: {sent:?}");
         assert_eq!(commands[0].sample, self.sample - 1, "the sample is echoed");
         commands[0]
     }
 
-    /// A sample that is lost on its way.
+    /// A sample that is lost on the way.
     pub(crate) fn lose(&mut self) {
         self.next_feedback();
         self.now += self.period;

@@ -1,4 +1,4 @@
-//! What the node makes of faults.
+//! The node's reaction to faults.
 
 use firmware::control::controller::Config;
 use firmware::control::fault::{MAX_GAP_MS, REACTIONS};
@@ -80,7 +80,7 @@ fn following_error_and_drive_faults_stop_the_arm() {
     bench.run(200);
     assert_eq!(bench.mode(), Mode::Fault);
     assert!(is_off(&bench.command()));
-    // A reset leads to a state without torque, and forgets the cause.
+    // A reset leads to a state without torque and clears the cause.
     assert_eq!(
         bench.request(MotionRequest::FaultReset),
         Some(Outcome::Accepted)
@@ -111,7 +111,7 @@ fn three_bad_feedback_frames_in_a_row_stop_the_arm() {
     assert_eq!(bench.node.controller().cause(), Cause::Corrupted);
 }
 
-/// A frame whose checksum is right and whose shoulder speed is not a number.
+/// A frame with a valid checksum and a shoulder speed of NaN.
 fn not_a_number(good: &CanFrame) -> CanFrame {
     let mut bytes = good.data().to_vec();
     let counter = bytes[bytes.len() - 3];
@@ -120,7 +120,7 @@ fn not_a_number(good: &CanFrame) -> CanFrame {
     CanFrame::fd(good.id(), &bytes, true).unwrap()
 }
 
-/// A node that has just met with this, and what it has sent; `None` for a cause that is reserved.
+/// A node that has just met with this cause, and what it has sent; `None` for a reserved cause.
 fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
     let mut bench = match cause {
         Cause::SelfTest => {
@@ -163,7 +163,7 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.run(3)
         }
         Cause::OverSpeed => {
-            // 1.1 x 2.2 m/s at 25 mm a turn are 608 rad/s at motor 3.
+            // 1.1 x 2.2 m/s at 25 mm per turn is 608 rad/s at motor 3.
             bench.velocity[2] = 610.0;
             bench.run(3)
         }
@@ -199,7 +199,7 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
     Some((bench, sent))
 }
 
-/// Every cause of the fault table can be brought about, is latched, sent once, and repeated in the state with its number.
+/// Every cause of the fault table can be raised, is latched, sent once, and repeated in the state with its number.
 #[test]
 fn every_cause_of_the_table_is_raised_and_reported_in_words() {
     for cause in Cause::ALL {
@@ -236,7 +236,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
     }
 }
 
-/// What stops the arm is a time, whatever the rate: 5 ms are 10 samples at 2 kHz.
+/// The arm is stopped after a time, whatever the rate: 5 ms is 10 samples at 2 kHz.
 #[test]
 fn a_gap_is_judged_by_its_time() {
     for (lost, expected) in [(9, Mode::Enabled), (10, Mode::FaultReaction)] {
@@ -250,7 +250,7 @@ fn a_gap_is_judged_by_its_time() {
     }
 }
 
-/// A limit that has acted in one sample of twenty is in the next report, and only there.
+/// A limit that has acted in one of twenty samples is in the next report, and only there.
 #[test]
 fn limits_are_kept_until_they_are_reported() {
     let mut bench = Bench::enabled();
@@ -265,7 +265,7 @@ fn limits_are_kept_until_they_are_reported() {
     assert_eq!(reports.iter().filter(with).count(), 1, "{reports:?}");
 }
 
-/// A failed self-test is left by nothing.
+/// Nothing leaves a failed self-test.
 #[test]
 fn a_failed_self_test_stays() {
     let (mut bench, _) = raise(Cause::SelfTest).unwrap();

@@ -1,4 +1,4 @@
-//! The node on a bus of the test's own: what it answers, what it refuses, and what it ignores.
+//! The node on a simulated bus: what it answers, refuses and ignores.
 
 mod bench;
 mod faults;

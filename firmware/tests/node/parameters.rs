@@ -1,4 +1,4 @@
-//! Parameters of a node: a value that was set acts from the next sample on.
+//! Parameters of a node: a new value takes effect from the next sample on.
 
 use std::ops::{Deref, DerefMut};
 
@@ -17,7 +17,7 @@ use protocol::time::Duration;
 
 use crate::bench::{Bench, PERIOD};
 
-/// A bench with a client of the parameters, and an arm that a test can push.
+/// A bench with a parameter client, and an arm that a test can push.
 struct Client {
     bench: Bench,
     counters: [u8; 2],
@@ -42,13 +42,13 @@ impl Client {
     fn of(bench: Bench) -> Self {
         Self {
             bench,
-            // The bench has introduced itself with number 0.
+            // The bench has sent its Hello with counter 0.
             counters: [1, 0],
             joints: Vector4::new(0.2, 1.5, 0.15, 0.3),
         }
     }
 
-    /// Ready, and the operator known.
+    /// A bench in Ready that has received the operator's Hello.
     fn new() -> Self {
         let mut bench = Bench::new();
         bench.hello(protocol::table::HASH);
@@ -62,21 +62,21 @@ impl Client {
         Self::of(Bench::enabled())
     }
 
-    /// Moves a joint out of the way.
+    /// Displaces a joint.
     fn push(&mut self, axis: usize, by: f32) {
         self.joints[axis] += by;
         let joints = self.joints;
         self.put(&joints);
     }
 
-    /// Hands a request over without waiting for a sample.
+    /// Passes a request to the node without waiting for a sample.
     fn ask(&mut self, request: MotionRequest) {
         let frame = self.motion(request);
         self.wire.to_node.push_back(frame);
         self.poll();
     }
 
-    /// What the node sends at once when asked.
+    /// What the node sends at once on a parameter request.
     fn parameter(&mut self, request: ParameterRequest) -> Vec<Message> {
         self.receive(0, Message::ParameterRequest(Server::Controller, request))
     }
@@ -123,7 +123,7 @@ impl Client {
     }
 }
 
-/// A listing holds the values of a new node: its configuration, and elsewhere the table's defaults.
+/// A listing has the values of a new node: its configuration, and otherwise the table's defaults.
 #[test]
 fn a_new_node_has_the_defaults() {
     let mut bench = Client::new();
@@ -137,7 +137,7 @@ fn a_new_node_has_the_defaults() {
     }
 }
 
-/// Each field is connected to its own name: what is set is read back, and nothing else changes.
+/// Each field is connected to its own name: a value set is read back, and nothing else changes.
 #[test]
 fn every_parameter_is_kept_by_itself() {
     for &parameter in ControllerParameter::ALL {
@@ -166,7 +166,7 @@ fn every_parameter_is_kept_by_itself() {
     }
 }
 
-/// The elbow is pushed by 0.03 rad, which the default of 0.05 rad rides out, in the very sample after the request.
+/// In the very sample after the request the elbow is pushed by 0.03 rad, which the default of 0.05 rad tolerates.
 #[test]
 fn a_smaller_following_error_stops_the_arm_earlier() {
     let push = |bench: &mut Client| {
@@ -185,7 +185,7 @@ fn a_smaller_following_error_stops_the_arm_earlier() {
     assert_eq!(bench.mode(), Mode::FaultReaction);
 }
 
-/// A violation that is under way is counted on when the limit of another axis changes.
+/// A violation in progress keeps its count when the limit of another axis changes.
 #[test]
 fn setting_a_limit_does_not_start_the_count_again() {
     let mut bench = Client::enabled();
@@ -205,7 +205,7 @@ fn fewer_fault_samples_stop_the_arm_earlier() {
     assert_eq!(bench.node.controller().cause(), Cause::FollowingError);
 }
 
-/// PD with gravity compensation: a torque in proportion to the error and the square of the bandwidth.
+/// PD with gravity compensation: torque is proportional to the error and to the square of the bandwidth.
 #[test]
 fn the_bandwidth_changes_the_next_command() {
     let mut bench = Client::new();
@@ -224,7 +224,7 @@ fn the_bandwidth_changes_the_next_command() {
     assert!((ratio - 4.0).abs() < 1e-3, "{before} over {after}: {ratio}");
 }
 
-/// Samples from Enable until the control word allows a move, and from Disable until it takes the torque away.
+/// Samples from Enable until the control word allows a move, and from Disable until it switches torque off.
 #[test]
 fn the_brake_delay_times_the_control_word() {
     for (delay, samples) in [(0.06, 60), (0.2, 200)] {
@@ -312,7 +312,7 @@ fn what_changes_torques_waits_until_the_arm_is_at_rest() {
     );
 }
 
-/// The first frame that a node hears may be a recording.
+/// The first frame that a node receives may be a replay.
 #[test]
 fn a_first_frame_changes_nothing() {
     let mut bench = Client::new();
@@ -324,7 +324,7 @@ fn a_first_frame_changes_nothing() {
     bench.set(limit, 0.3);
 }
 
-/// What belongs to the drives goes to them, and their answer comes back; silent drives are not waited for.
+/// Requests for the drives are forwarded and their answers returned; silent drives are not waited for.
 #[test]
 fn the_drives_are_asked_through_the_controller() {
     let mut bench = Client::new();
@@ -373,7 +373,7 @@ fn request() -> impl Strategy<Value = ParameterRequest> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever is set, every value stays in its range, and the node answers each feedback with finite torques.
+    /// Whatever is set, every value stays in range, and the node answers each feedback with finite torques.
     #[test]
     fn no_requests_lead_out_of_a_range(requests in prop::collection::vec(request(), 1..100)) {
         let mut bench = Client::enabled();

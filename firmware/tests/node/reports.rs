@@ -1,4 +1,4 @@
-//! What the node says by itself, how much it does in one call, and what it ignores.
+//! What the node sends unprompted, how much it does in one call, and what it ignores.
 
 use firmware::control::phase::{Phase, Probe};
 use proptest::prelude::*;
@@ -127,7 +127,7 @@ fn every_phase_of_a_sample_is_marked_once_and_in_order() {
         .node
         .poll_with(bench.now, Some(&frame), &mut bench.wire, &mut marks);
     let mut expected = Phase::ALL.to_vec();
-    // What other frames would have taken.
+    // The time that other frames would have taken.
     expected.insert(Phase::ALL.len() - 1, Phase::Decode);
     assert_eq!(marks.0, expected);
 
@@ -138,7 +138,7 @@ fn every_phase_of_a_sample_is_marked_once_and_in_order() {
     assert_eq!(marks.0, [Phase::Decode, Phase::Report]);
 }
 
-/// A jump so slow that an arm that stands still does not stand out.
+/// A jump so slow that an arm standing still does not trip the monitor.
 fn jump() -> MotionRequest {
     MotionRequest::Jump {
         target: [0.6, 0.2, -0.25, 0.0],
@@ -148,7 +148,7 @@ fn jump() -> MotionRequest {
     }
 }
 
-/// No call both plans and reports; reports wait for ten samples at the most.
+/// No call both plans and reports; reports wait for at most ten samples.
 #[test]
 fn planning_and_reports_take_turns() {
     let mut bench = Bench::enabled();

@@ -1,4 +1,4 @@
-//! What an operator asks for, and the answers.
+//! Requests of an operator, and the answers.
 
 use firmware::control::controller::{Config, Controller};
 use firmware::control::states::Event;
@@ -45,7 +45,7 @@ fn requests_are_refused_where_they_make_no_sense() {
     );
 }
 
-/// A flood of requests is answered one by one; what finds no room on the bus is counted, not forgotten.
+/// A flood of requests is answered one by one; frames that find no room on the bus are counted, not forgotten.
 #[test]
 fn answers_that_pile_up_are_sent_or_counted() {
     let mut bench = Bench::enabled();

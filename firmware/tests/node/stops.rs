@@ -1,4 +1,4 @@
-//! What goes to the drives after a fault: which stop, and what happens to it.
+//! Control words after a fault: which stop, and how it proceeds.
 
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
@@ -21,7 +21,7 @@ fn course(words: &[ControlWord]) -> Vec<ControlWord> {
     course
 }
 
-/// A loop must not be closed through an encoder that is lost or lies, not even to stop.
+/// A loop must not be closed through a lost or wrong encoder, not even to stop.
 #[test]
 fn a_bad_encoder_takes_brake_and_torque_off_in_the_same_command() {
     let lost = |bench: &mut Bench| bench.status = DriveStatus::READY;
@@ -37,7 +37,7 @@ fn a_bad_encoder_takes_brake_and_torque_off_in_the_same_command() {
             assert!(is_off(&command), "{command:?}");
             let fault = *bench.node.controller().fault();
             assert_eq!(fault.cause, Cause::EncoderFault);
-            // Stopping or closing its brake, the arm does the same.
+            // The same while the arm stops or its brake closes.
             let mut bench = Bench::moving();
             bench.wire.to_node.push_back(estop());
             assert_eq!(bench.command().control, ESTOP_STOPPING);
@@ -53,7 +53,7 @@ fn a_bad_encoder_takes_brake_and_torque_off_in_the_same_command() {
     assert!(state.fault_value.abs() > 0.7, "{}", state.fault());
 }
 
-/// The faulty drive may be that of the lift: nothing but the brake holds it then.
+/// The faulty drive may be the one of the lift: then only the brake holds it.
 #[test]
 fn a_drive_in_fault_closes_the_brake_first() {
     let mut bench = Bench::moving();
@@ -84,7 +84,7 @@ fn a_fault_while_stopping_goes_straight_to_the_brake() {
     }
 }
 
-/// A stop that the arm does not follow closes the brake; torque that it does not follow even then goes.
+/// A stop that the arm does not follow closes the brake; if it does not follow even then, torque goes off.
 #[test]
 fn a_stop_that_is_not_followed_ends_at_the_brake() {
     let mut bench = Bench::moving();
@@ -99,7 +99,7 @@ fn a_stop_that_is_not_followed_ends_at_the_brake() {
     assert_eq!(closing, 3, "three samples in a row");
 }
 
-/// Undisturbed, a stop comes to rest on the path before the brake closes.
+/// An undisturbed stop comes to rest on the path before the brake closes.
 #[test]
 fn a_stop_that_is_followed_ends_at_rest() {
     let mut bench = Bench::moving();

@@ -92,7 +92,7 @@ fn the_first_request_of_an_operator_switches_nothing_on() {
         bench.refusal(MotionRequest::Enable),
         RefusalReason::WrongState
     );
-    // The second one is no replay of the first.
+    // The second one is not a replay of the first.
     assert_eq!(
         bench.request(MotionRequest::Enable),
         Some(Outcome::Accepted)
@@ -124,7 +124,7 @@ fn an_emergency_stop_is_latched() {
     bench.wire.to_node.push_back(estop());
     bench.step();
     assert_eq!(bench.mode(), Mode::EStop);
-    // The lift is never dropped: the brake closes before the torque goes.
+    // The lift is never dropped: the brake closes before torque goes off.
     assert!(bench.command().control.contains(ControlWord::TORQUE_ENABLE));
     bench.run(200);
     assert_eq!(bench.mode(), Mode::EStop);

@@ -172,7 +172,7 @@ pub struct MotionReply {
     pub outcome: Outcome,
 }
 
-/// What became of a request.
+/// Outcome of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Outcome {

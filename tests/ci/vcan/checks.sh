@@ -43,7 +43,7 @@ passed "a second run on the same controller: trace equal byte for byte"
 # --- a second controller, a second plant
 mark
 timeout 60 "$bin/plant-sim" timing --bus socketcan:vcan0 --rate 100 --seconds 6 --svg t.svg >timing.txt 2>timing.err & timing=$!
-await_controller "the drives are there\|reset by network management"
+await_controller "the drives are present\|reset by network management"
 timeout 20 "$bin/controller" --bus socketcan:vcan0 2>second.err && fail "a second controller was accepted"
 grep -q "another controller is on socketcan:vcan0" second.err || fail "second controller: message"
 plant --out second >second.txt 2>>second.err && fail "a second plant was accepted"

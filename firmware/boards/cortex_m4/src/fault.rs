@@ -1,4 +1,4 @@
-//! Where the core goes when something has failed: torque off, reason kept, reset.
+//! Fault handling of the core: torque off, reason kept, reset.
 
 use core::arch::naked_asm;
 use core::mem::MaybeUninit;
@@ -9,20 +9,20 @@ use cortex_m::peripheral::{FPU, SCB};
 use firmware::cabinet::reset::{Record, Stop};
 use protocol::messages::ResetReason;
 
-/// The frame could not be written (CFSR: STKERR, MSTKERR).
+/// The exception frame could not be written (CFSR: STKERR, MSTKERR).
 const NO_FRAME: u32 = 1 << 12 | 1 << 4;
-/// The program counter among the words that the core stacks.
+/// Index of the program counter among the words that the core stacks.
 const PROGRAM_COUNTER: usize = 6;
-/// Words of an exception frame without the FPU's.
+/// Words of an exception frame without FPU registers.
 const FRAME: usize = 8;
-/// Bytes of stack that are enough for the rest of this file.
+/// Bytes of stack sufficient for the rest of this file.
 const ROOM: usize = 256;
-/// Registers of the FPU are still to be stacked (FPCCR: LSPACT).
+/// FPU registers have yet to be stacked (FPCCR: LSPACT).
 const LAZY_STACKING: u32 = 1;
 
 unsafe extern "Rust" {
-    /// The board's: takes torque away and lets the brake close, by registers alone, since what has failed may be what a
-    /// driver needs. Returns the outputs as found and as read back.
+    /// Provided by the board: switches torque off and lets the brake close, by registers alone, since drivers may
+    /// depend on what has failed. Returns the outputs as found and as read back.
     safe fn board_torque_off() -> [u8; 2];
 }
 
@@ -31,20 +31,20 @@ unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// In RAM that the start-up code does not touch. Used by more than the compiler sees: by the program before.
+/// In RAM that the start-up code does not touch. The compiler cannot see one of its users: the program before the
+/// reset.
 #[used]
 #[unsafe(link_section = ".uninit.kept")]
 static KEPT: MaybeUninit<Record> = MaybeUninit::uninit();
 
 fn kept() -> &'static Record {
-    // SAFETY: a record is four words, of which every value is valid.
+    // SAFETY: a record is four words, and every value of them is valid.
     unsafe { KEPT.assume_init_ref() }
 }
 
-/// A fault for which no handler of its own is enabled, or that came where no other could be taken.
+/// A fault without an enabled handler of its own, or where no other could be taken.
 ///
-/// Where there is no room left on the stack, or no stack, the handler begins a new one at the top: what is there is of no
-/// use any more.
+/// If the stack is exhausted or invalid, the handler starts a new one at the top: its contents are no longer needed.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 unsafe extern "C" fn hard_fault() -> ! {
@@ -64,7 +64,7 @@ unsafe extern "C" fn hard_fault() -> ! {
     )
 }
 
-/// The stack has left its place, or an address was not to be touched.
+/// The stack has overflowed, or a forbidden address was accessed.
 #[unsafe(naked)]
 #[unsafe(export_name = "MemoryManagement")]
 unsafe extern "C" fn memory_fault() -> ! {
@@ -72,8 +72,8 @@ unsafe extern "C" fn memory_fault() -> ! {
 }
 
 extern "C" fn fault(frame: *const u32) -> ! {
-    // SAFETY: registers of the core, and nothing else runs any more. Without the flag the first instruction of the FPU
-    // would write to the old stack.
+    // SAFETY: registers of the core, and nothing else runs any more. With the flag set, the first FPU instruction would
+    // write to the old stack.
     let status = unsafe {
         (*FPU::PTR).fpccr.modify(|bits| bits & !LAZY_STACKING);
         (*SCB::PTR).cfsr.read()
@@ -82,7 +82,7 @@ extern "C" fn fault(frame: *const u32) -> ! {
     let last = frame.wrapping_add(FRAME - 1);
     let is_there = status & NO_FRAME == 0 && stack.contains(&frame) && stack.contains(&last);
     let at = if is_there {
-        // SAFETY: the core has written the frame, and it lies within the stack.
+        // SAFETY: the core has written the frame, and it is within the stack.
         unsafe { ptr::read_volatile(frame.wrapping_add(PROGRAM_COUNTER)) }
     } else {
         0
@@ -90,7 +90,7 @@ extern "C" fn fault(frame: *const u32) -> ! {
     stop(ResetReason::HardFault, at, status)
 }
 
-/// Takes torque away and resets the board, which then starts for this reason.
+/// Switches torque off and resets the board, which then starts with this reason.
 pub fn restart(reason: ResetReason) -> ! {
     stop(reason, 0, 0)
 }
@@ -107,7 +107,7 @@ fn stop(reason: ResetReason, at: u32, status: u32) -> ! {
     SCB::sys_reset()
 }
 
-/// How the program ended before this start, if it ended here. Tells it once.
+/// How the program ended before this start, if it ended here. Returned once.
 pub fn last_stop() -> Option<Stop> {
     kept().take()
 }

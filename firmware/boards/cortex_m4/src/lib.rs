@@ -1,8 +1,8 @@
-//! What the boards with a Cortex-M4F have in common: a guard below the stack, and an end for whatever fails.
+//! Common to the boards with a Cortex-M4F: a stack guard and fault handlers that stop safely.
 //!
-//! The stack lies at the bottom of RAM and grows down. Below it the memory protection unit allows nothing: an overflow is
-//! a fault before anything has been overwritten. Every fault ends here, and so do panics and resets asked for: torque off,
-//! the reason kept where a reset leaves it alone, reset.
+//! The stack is at the bottom of RAM and grows down. Below it the memory protection unit denies all access: an overflow
+//! faults before anything is overwritten. Every fault ends here, as do panics and requested resets: torque off, the
+//! reason kept in memory that survives the reset, reset.
 //!
 //! A board provides the function `board_torque_off`, and a stack between the symbols `_stack_end` and `_stack_start`.
 

@@ -1,4 +1,4 @@
-//! What time it is for the controller.
+//! The controller's time.
 
 use std::time;
 
@@ -8,23 +8,23 @@ use protocol::table;
 use protocol::time::{Duration, Instant, Period};
 
 /// Silence of the drives after which a clock in lock-step runs by itself. Longer than any pause of a loaded machine: a
-/// plant that only computes must not look as if it had died.
+/// plant that is computing must not look dead.
 const LOCK_STEP_LIMIT: time::Duration = time::Duration::from_secs(1);
 
-/// Source of the time that the node is given.
+/// Source of the node's time.
 pub(crate) enum Clock {
-    /// The machine's: for drives that sample in real time.
+    /// The machine's clock, for drives that sample in real time.
     RealTime {
         /// Origin.
         started: time::Instant,
     },
-    /// The drives' samples: for a plant in lock-step.
+    /// The drives' samples, for a plant in lock-step.
     LockStep {
         /// Time.
         clock: SampleClock,
         /// Sampling period.
         period: Period,
-        /// Last sign of the plant, or the last time that the clock was moved on without one.
+        /// Last sign of the plant, or the last time the clock was advanced without one.
         heard: time::Instant,
         /// Whether the plant is there.
         present: bool,
@@ -55,7 +55,7 @@ impl Clock {
         }
     }
 
-    /// A node starts at 0 in lock-step, whatever the cause: what follows is the same in every run.
+    /// A node starts at 0 in lock-step, whatever the cause, so that every run is the same from there.
     pub(crate) fn restart(&mut self) {
         if let Self::LockStep {
             clock,
@@ -70,7 +70,8 @@ impl Clock {
         }
     }
 
-    /// Looks at a frame before the node does. Returns whether the node is to look at the time first.
+    /// Looks at a frame before the node does. Returns whether the node has to be polled for the
+    /// time first.
     pub(crate) fn observe(&mut self, frame: &CanFrame) -> bool {
         if let Self::LockStep {
             clock,
@@ -87,7 +88,7 @@ impl Clock {
         false
     }
 
-    /// Time passes without frames. Returns whether the node is to look at its watchdogs.
+    /// Time passes without frames. Returns whether the node has to check its watchdogs.
     pub(crate) fn idle(&mut self) -> bool {
         match self {
             Self::RealTime { .. } => true,

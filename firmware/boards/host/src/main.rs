@@ -1,6 +1,6 @@
 //! `controller`: the controller of the cabinet as a Linux process, on SocketCAN or a serial-line adapter.
 //!
-//! The same node as on the boards, with a socket for a CAN controller.
+//! The same node as on the boards, with a socket as its CAN controller.
 
 mod clock;
 mod shell;
@@ -30,7 +30,7 @@ struct Args {
     /// Sampling rate of the drives.
     #[arg(long, value_name = "HZ", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(100..=10_000))]
     rate: u32,
-    /// Take the time from this machine and ask for real-time scheduling: for drives that sample in real time. Otherwise
+    /// Take the time from this machine and request real-time scheduling, for drives that sample in real time. Otherwise
     /// time is counted in samples, for a plant that waits for each command (lock-step).
     #[arg(long)]
     real_time: bool,
@@ -70,7 +70,7 @@ fn run(args: &Args) -> Result<(), String> {
         .map_err(|error| error.to_string())
 }
 
-/// The robot of a file, if the controller can work with it.
+/// The robot of a file, if the controller can use it.
 fn load(path: &Path) -> Result<ArmModel, String> {
     let name = path.display();
     let text = fs::read_to_string(path).map_err(|error| format!("cannot read {name}: {error}"))?;

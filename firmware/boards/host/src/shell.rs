@@ -1,4 +1,4 @@
-//! The loop around the node: waits for frames, tells the time, reports what changes.
+//! The loop around the node: waits for frames, passes the time, reports changes.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
@@ -12,7 +12,7 @@ use protocol::table;
 
 use crate::clock::{Clock, is_feedback};
 
-/// How long a bus is listened to before taking part: three heartbeats.
+/// Time to listen on a bus before taking part: three heartbeats.
 const LISTEN: Duration = Duration::from_millis(300);
 /// Longest wait for a frame: resolution of watchdogs and of Ctrl-C.
 const TICK: Duration = Duration::from_millis(5);
@@ -22,7 +22,7 @@ const SILENCE: Duration = Duration::from_secs(1);
 /// Why the controller ended.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ShellError {
-    /// Another controller sends with our identifiers.
+    /// Another controller uses the same identifiers.
     #[error(
         "another controller is on {bus}: {name} (identifier {id:#05x}) was heard, which only a controller sends; \
          stop one of the two"
@@ -40,7 +40,7 @@ pub(crate) enum ShellError {
     Link(#[from] LinkError),
 }
 
-/// What happened, for the last line.
+/// Counts for the final report.
 #[derive(Default)]
 struct Counts {
     feedback: u64,
@@ -53,10 +53,10 @@ pub(crate) struct Shell {
     config: Config,
     node: Node,
     clock: Clock,
-    /// Sampling period if deadlines are real.
+    /// Sampling period, in real time only.
     deadline: Option<Duration>,
     mode: Mode,
-    /// Last feedback.
+    /// Time of the last feedback.
     heard: Option<Instant>,
     counts: Counts,
 }
@@ -105,7 +105,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Hears what is on the bus before saying anything.
+    /// Listens on the bus before sending anything.
     fn listen(&mut self, stop: &AtomicBool) -> Result<(), ShellError> {
         let end = Instant::now() + LISTEN;
         while !stop.load(Ordering::Relaxed) {
@@ -140,7 +140,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Lets the node look at one frame, or at the time alone.
+    /// Polls the node with one frame or with the time alone.
     fn poll(&mut self, received: Option<&CanFrame>) {
         self.node.poll(self.clock.now(), received, &mut self.link);
         let controller = self.node.controller();
@@ -155,14 +155,14 @@ impl Shell {
         }
     }
 
-    /// Books a sample, and whether it was answered within its period.
+    /// Counts a sample, and whether it was answered within its period.
     fn answered(&mut self, at: SystemTime) {
         if self.heard.is_none() {
-            eprintln!("controller: the drives are there");
+            eprintln!("controller: the drives are present");
         }
         self.heard = Some(Instant::now());
         self.counts.feedback += 1;
-        // A clock that was set in between tells nothing.
+        // If the clock was set in between, the age is unknown.
         let age = at.elapsed().unwrap_or_default();
         if self.deadline.is_some_and(|period| age > period) {
             self.counts.late += 1;

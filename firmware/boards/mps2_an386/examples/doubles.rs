@@ -1,4 +1,4 @@
-//! Links, and must be refused by `tests/board/symbols`: the proof that heap and double precision in an image are found.
+//! Links, and must be refused by `tests/board/symbols`: proof that heap and double precision in an image are detected.
 //! Empty on any other target.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -17,7 +17,7 @@ mod image {
     /// An allocator that never has any memory.
     struct Empty;
 
-    // SAFETY: a null pointer says that there is no memory; so nothing is ever freed.
+    // SAFETY: a null pointer means that there is no memory; so nothing is ever freed.
     unsafe impl GlobalAlloc for Empty {
         #[inline(never)]
         unsafe fn alloc(&self, _: Layout) -> *mut u8 {

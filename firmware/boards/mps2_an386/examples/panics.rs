@@ -1,4 +1,4 @@
-//! Must not link: the proof that a panic in an image is found. Empty on any other target.
+//! Must not link: proof that a panic in an image is detected. Empty on any other target.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

@@ -1,4 +1,4 @@
-//! The image: asks the host for configuration and channel, then runs the node on that channel.
+//! The image: reads configuration and channel from the host, then runs the node on that channel.
 
 mod adapter;
 mod host;
@@ -31,12 +31,12 @@ pub(crate) use host::End;
 use host::File;
 use pins::Pins;
 
-/// What an image adds to the board: each has its own at its root.
+/// What an image adds to the board, implemented at the root of each.
 pub(crate) trait Image {
     /// Measures the phases of a call of the node.
     type Meter: Probe + Default + Into<Measured>;
 
-    /// Plants a fault. An image that plants none has been mistaken for another by a host that asks for one.
+    /// Plants a fault. An error in images without planted faults: the host has mistaken it for another.
     fn plant(_: Fault) -> Result<(), End> {
         Err(End)
     }
@@ -47,8 +47,8 @@ const SYST_MAX: u32 = 0x00FF_FFFF;
 
 #[entry]
 fn main() -> ! {
-    // Static, so that the stack holds calls only. The attribute hands these out once, as references.
-    // Not an `Option`, whose `None` need not be zeros and then takes its size in flash.
+    // Static, so that the stack holds calls only. The attribute hands these out once, as references. Not an `Option`:
+    // its `None` may not be all zeros and would then take its full size in flash.
     static mut SETUP: MaybeUninit<Setup> = MaybeUninit::uninit();
     static mut NODE: MaybeUninit<Node> = MaybeUninit::uninit();
     static mut REPLY: Reply = Reply::new();
@@ -67,7 +67,7 @@ fn start(
     let input = File::open(TO_BOARD)?;
     let output = File::create(FROM_BOARD)?;
     let mut pins = pins::cabinet();
-    // No flag of this board says why it was reset; what has ended here has left a record.
+    // This board has no flag for the cause of a reset, but a program that ended here has left a record.
     let last = cortex_m4::last_stop().unwrap_or(Stop::without_fault(ResetReason::PowerOn));
     output.write(&greeting(&last))?;
     let mut journal = Journal::begin(&last);
@@ -77,7 +77,7 @@ fn start(
         core.SYST.enable_interrupt();
         uart::FRAMES.start_receiving();
     }
-    // Tells the host that the node is there.
+    // Signals to the host that the node is ready.
     output.write(reply.finish(&Measured::default()))?;
     match setup.channel {
         Channel::Fifo => serve(&input, &output, node, &mut pins, &mut journal, reply),
@@ -89,7 +89,7 @@ fn start(
     }
 }
 
-// Three steps out of line: each begins with the stack that the one before has given back.
+// Three steps out of line: each can use the stack that the previous one has released.
 
 #[inline(never)]
 fn receive<'a>(input: &File, slot: &'a mut MaybeUninit<Setup>) -> Result<&'a Setup, End> {
@@ -103,7 +103,7 @@ fn build<'a>(config: &Config, reset: ResetReason, slot: &'a mut MaybeUninit<Node
     slot.write(Node::new(*config, reset))
 }
 
-/// Answers until the host goes away.
+/// Answers requests until the host closes the channel.
 #[inline(never)]
 fn serve(
     input: &File,
@@ -150,12 +150,12 @@ fn poll<I: Image>(
     }
 }
 
-/// Timer ticks since SysTick stood at `before`.
+/// Timer ticks since SysTick read `before`.
 pub(crate) fn ticks_since(before: u32) -> u32 {
     before.wrapping_sub(SYST::get_current()) & SYST_MAX
 }
 
-/// What comes after every call of the node: a reset if it was asked for, the pins, the log.
+/// Follows every call of the node: a reset if requested, the pins, the log.
 fn settle(node: &Node, now: Instant, pins: &mut Pins, journal: &mut Journal) {
     if node.reset_asked() {
         cortex_m4::restart(ResetReason::Software);
@@ -175,7 +175,7 @@ fn start_timer(timer: &mut SYST) {
     timer.enable_counter();
 }
 
-/// The node's way out: the answer to the host.
+/// The node's transmit side: the reply to the host.
 struct Port<'a>(&'a mut Reply);
 
 impl Transmit for Port<'_> {
@@ -190,7 +190,7 @@ fn SysTick() {
     adapter::wrapped();
 }
 
-/// Every interrupt of the board: those of the UART's receiver, no other is enabled.
+/// Every interrupt of the board: only the one of the UART's receiver is enabled.
 #[exception]
 unsafe fn DefaultHandler(irq: i16) {
     if irq == uart::RECEIVE_IRQ {

@@ -1,5 +1,5 @@
-//! The controller with a meter at every border of two phases. Reading the timer costs a handful of instructions a phase,
-//! which is why the image that goes into runs has none. On any other target than the board this is an empty program.
+//! The controller with a meter at every phase border. Reading the timer costs a handful of instructions per phase,
+//! which is why the image used for runs has no meter. On any other target than the board this is an empty program.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -26,7 +26,7 @@ mod metered {
     /// Timer ticks of each phase.
     pub struct Meter {
         measured: Measured,
-        /// Where the timer stood when the last phase ended.
+        /// Timer value at the end of the last phase.
         last: u32,
     }
 

@@ -1,5 +1,5 @@
-//! The controller with faults that the host can plant: the proof that every one of them ends with torque off and its
-//! reason reported. On any other target than the board this is an empty program.
+//! The controller with faults that the host can plant: proof that each of them ends with torque off and its reason
+//! reported. On any other target than the board this is an empty program.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -24,7 +24,7 @@ mod planted {
     impl board::Image for Image {
         type Meter = ();
 
-        /// Does what the host asks for.
+        /// Causes the fault that the host requests.
         fn plant(fault: Fault) -> Result<(), End> {
             defmt::warn!("planted: {=str}", fault.name());
             match fault {
@@ -48,7 +48,8 @@ mod planted {
         overflow(0);
     }
 
-    /// Calls itself without end. Each call has something left to do after the next one, so that the compiler cannot make it a loop.
+    /// Calls itself without end. Each call has work left after the next one, so that the compiler cannot turn it into a
+    /// loop.
     #[inline(never)]
     #[expect(unconditional_recursion)]
     fn overflow(depth: u32) -> u32 {

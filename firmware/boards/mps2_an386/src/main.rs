@@ -1,6 +1,6 @@
 //! The controller on the emulated Cortex-M4F, in lock-step with the host.
 //!
-//! Nothing here but registers and the channel: the control code is the library's, byte for byte. On any other target than
+//! Only registers and the channel are here: the control code is the library's, byte for byte. On any other target than
 //! the board this is an empty program.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -11,7 +11,7 @@ mod board;
 #[path = "board/panic.rs"]
 mod panic;
 
-/// Nothing but the controller.
+/// The plain controller.
 #[cfg(target_os = "none")]
 struct Image;
 

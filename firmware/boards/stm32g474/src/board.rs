@@ -24,22 +24,22 @@ use protocol::messages::ResetReason;
 use can::{Can, Port, Received, ToSend};
 use clock::{CYCLES_PER_TICK, Clock, TICK};
 
-/// Time without a turn of the loop after which the watchdog resets the board, us: ten samples.
+/// Time without a pass of the loop after which the watchdog resets the board, us: ten samples.
 const WATCHDOG_US: u32 = 10_000;
 
 defmt::timestamp!("{=u32:ms}", clock::TICKS.load(Ordering::Relaxed));
 
 #[entry]
 fn main() -> ! {
-    // Static, so that the stack holds calls only. The attribute hands these out once, as references.
-    // Not an `Option`, whose `None` need not be zeros and then takes its size in flash.
+    // Static, so that the stack holds calls only. The attribute hands these out once, as references. Not an `Option`:
+    // its `None` may not be all zeros and would then take its full size in flash.
     static mut NODE: MaybeUninit<Node> = MaybeUninit::uninit();
     static mut TO_SEND: ToSend = ToSend::new();
     static mut RECEIVED: Received = Received::new();
 
     cortex_m4::guard();
     let board = embassy_stm32::init(clock::config());
-    // First of all: whatever hangs from here on ends in a reset, and a reset lets go of every pin.
+    // First of all: any hang from here on ends in a reset, and a reset releases every pin.
     let mut watchdog = IndependentWatchdog::new(board.IWDG, WATCHDOG_US);
     watchdog.unleash();
     let last = safe::last_stop();
@@ -91,7 +91,7 @@ fn main() -> ! {
         if ticked {
             watchdog.pet();
         }
-        // With interrupts held back: one that comes after the look ends the sleep all the same, and is taken after it.
+        // With interrupts masked: one that arrives after the check still ends the sleep, and is handled after it.
         cortex_m::interrupt::free(|_| {
             if !clock.is_due() && !port.has_frames() {
                 cortex_m::asm::wfi();

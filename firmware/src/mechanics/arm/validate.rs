@@ -1,4 +1,4 @@
-//! What a model has to satisfy before the controller computes with it.
+//! Validation of a model before the controller uses it.
 
 use core::fmt;
 
@@ -6,7 +6,7 @@ use nalgebra::{Vector3, Vector4};
 
 use super::{ArmModel, Axis, DriveTrain, JointLimits, Link, Payload};
 
-/// A number in a model that the controller cannot work with.
+/// A number in a model that the controller cannot use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelError {
     /// Name of the field, e.g. `link.mass`.
@@ -15,11 +15,11 @@ pub struct ModelError {
     pub axis: Option<Axis>,
     /// The value found.
     pub value: f32,
-    /// What is allowed instead.
+    /// The rule that it breaks.
     pub rule: Rule,
 }
 
-/// What a number in a model has to be. All of them imply finite.
+/// Requirement on a number of a model. All of them imply that it is finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {
     /// Any finite number.
@@ -28,9 +28,9 @@ pub enum Rule {
     Positive,
     /// Zero or greater.
     NotNegative,
-    /// Greater than the lower limit, which is given.
+    /// Greater than the given lower limit.
     Above(f32),
-    /// At most the value given.
+    /// At most the given value.
     AtMost(f32),
     /// +1 or -1.
     Sign,
@@ -49,7 +49,7 @@ impl Rule {
             }
     }
 
-    // Out of line, as are the next two: in line they would be kilobytes, run once.
+    // Out of line, like the next two: inlined they would be kilobytes that run once.
     #[inline(never)]
     fn check(self, field: &'static str, axis: Option<Axis>, value: f32) -> Result<(), ModelError> {
         if self.allows(value) {
@@ -129,7 +129,7 @@ impl ArmModel {
     ///
     /// # Errors
     ///
-    /// The first field that is not finite or negative, or the mass if it is over `payload_max`.
+    /// The first field that is negative or not finite, or the mass if it exceeds `payload_max`.
     pub fn validate_payload(&self, payload: &Payload) -> Result<(), ModelError> {
         Rule::NotNegative.check("payload.mass", None, payload.mass)?;
         Rule::AtMost(self.payload_max).check("payload.mass", None, payload.mass)?;
@@ -142,7 +142,7 @@ impl Link {
     fn validate(&self, axis: Axis) -> Result<(), ModelError> {
         Rule::Positive.check("link.mass", Some(axis), self.mass)?;
         Rule::Finite.check_vector("link.com", Some(axis), &self.com)?;
-        // Not zero: a shaft without inertia would make the mass matrix singular.
+        // Not zero: without inertia of the shaft the mass matrix would be singular.
         Rule::Positive.check_vector("link.inertia", Some(axis), &self.inertia)
     }
 }
@@ -174,7 +174,8 @@ impl DriveTrain {
         Rule::NotNegative.check_joint("drive.viscous", &self.viscous)?;
         Rule::NotNegative.check_joint("drive.coulomb", &self.coulomb)?;
         Rule::Positive.check_joint("drive.coulomb_eps", &self.coulomb_eps)?;
-        // Up to 2^24 counts a turn every count is an f32; beyond, rounding is still far below a count of the load.
+        // Up to 2^24 counts per turn every count is an f32; beyond that, rounding is still far below a count of the
+        // load.
         Rule::Positive.check("drive.encoder_counts", None, self.encoder_counts as f32)
     }
 }

@@ -11,7 +11,7 @@
 //! ball nut unless motor 3 follows: hence the coupling of lift and wrist. Torques go the other way through the
 //! transpose, `tau_joint = A^T tau_motor`, and rotor inertia Jm appears at the joints as `A^T Jm A`.
 //!
-//! Rotors are taken as spinning about their own axes only; what the turning arm adds to that is of the order 1/N.
+//! Rotors are assumed to spin about their own axes only; the contribution of the turning arm is of the order 1/N.
 
 use core::f32::consts::TAU;
 
@@ -52,7 +52,7 @@ impl Drive {
         }
     }
 
-    /// Motor angles `A q` (rad) at joint position `q`. The map is linear: it takes speeds and accelerations likewise.
+    /// Motor angles `A q` (rad) at joint position `q`. The map is linear and also holds for speeds and accelerations.
     #[must_use]
     pub fn motor_angle(&self, q: &Vector4<f32>) -> Vector4<f32> {
         let mut phi = self.ratio.component_mul(q);
@@ -96,8 +96,7 @@ impl Drive {
         )
     }
 
-    /// Joint efforts (N m, lift N) of motor torques on the axis of the same number alone: what each axis gets from its own
-    /// motor.
+    /// Joint efforts (N m, lift N) of motor torques without the coupling: what each axis gets from its own motor.
     #[must_use]
     pub fn own_torque(&self, motor: &Vector4<f32>) -> Vector4<f32> {
         self.ratio.component_mul(motor)
@@ -111,7 +110,7 @@ impl Drive {
         tau
     }
 
-    /// Inertia of the rotors at the joints, `A^T Jm A`, to be added to the mass matrix.
+    /// Inertia of the rotors at the joints, `A^T Jm A`, to add to the mass matrix.
     #[must_use]
     pub fn rotor_inertia(&self) -> Matrix4<f32> {
         let reflected = self.rotor.component_mul(&self.ratio);
@@ -129,19 +128,19 @@ impl Drive {
         self.friction_at(qd, &self.coulomb_eps)
     }
 
-    /// Friction as [`Drive::friction`], with Coulomb friction smoothed over the speeds `eps`, all greater than zero.
+    /// Like [`Drive::friction`], with Coulomb friction smoothed over the speeds `eps`, all greater than zero.
     ///
-    /// A controller that compensates friction at the *measured* speed wants this wider than the friction itself: over a narrow step it
-    /// would turn the noise of the measurement into chatter. Not on the control path: the laws compensate at the planned speed.
+    /// To compensate friction at the *measured* speed, `eps` has to be wider than in the friction itself: a narrow step
+    /// would turn measurement noise into chatter. Not on the control path: the laws compensate at the planned speed.
     #[must_use]
     pub fn friction_at(&self, qd: &Vector4<f32>, eps: &Vector4<f32>) -> Vector4<f32> {
         let step = qd.component_div(eps).map(tanh);
         self.viscous.component_mul(qd) + self.coulomb.component_mul(&step)
     }
 
-    /// Coulomb friction at joint speeds `qd` (N m, lift N) for plans: with a straight line where [`Drive::friction`] has a
-    /// hyperbolic tangent, in a third of the time. The two differ by a quarter of the friction at the most, and only at
-    /// speeds next to rest, where no torque is scarce.
+    /// Coulomb friction at joint speeds `qd` (N m, lift N) for plans: a straight line replaces the hyperbolic
+    /// tangent of [`Drive::friction`], in a third of the time. The two differ by at most a quarter of the friction, and
+    /// only near rest, where torque is plentiful.
     #[must_use]
     pub fn coulomb_friction(&self, qd: &Vector4<f32>) -> Vector4<f32> {
         let step = qd.component_div(&self.coulomb_eps);
@@ -149,13 +148,13 @@ impl Drive {
             .component_mul(&step.map(|x| clamp(x, -1.0, 1.0)))
     }
 
-    /// Motor angles (rad) at encoder readings, counted from the zero of the joints. Off by at most 3 u of the angle.
+    /// Motor angles (rad) at encoder readings, counted from the zero of the joints. Relative error at most 3 u.
     #[must_use]
     pub fn motor_angle_of_counts(&self, counts: &[i32; 4]) -> Vector4<f32> {
         Vector4::from(counts.map(|n| n as f32)) * self.count
     }
 
-    /// Encoder readings nearest to motor angles `phi` (rad); the ends of the range for angles beyond it, 0 for NaN.
+    /// Encoder readings nearest to motor angles `phi` (rad), saturated to the range; 0 for NaN.
     ///
     /// Not on the control path: for drives in tests, the inverse of [`Drive::motor_angle_of_counts`].
     #[must_use]

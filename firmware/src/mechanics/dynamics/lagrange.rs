@@ -9,8 +9,8 @@
 //! 2 T = A w1^2 + B w2^2 + G w4^2 + 2 k12 w1 w2 + 2 k14 w1 w4 + 2 k24 w2 w4 + m d3'^2
 //! ```
 //!
-//! With `d` the derivative of a coupling by its angle, Lagrange's equations in these rates hold two centrifugal terms
-//! each and nothing else:
+//! With `d` the derivative of a coupling with respect to its angle, Lagrange's equations in these rates have two
+//! centrifugal terms each and nothing else:
 //!
 //! ```text
 //! f1 = A w1' + k12 w2' + k14 w4' + d12 w2^2 + d14 w4^2
@@ -18,29 +18,29 @@
 //! f4 = k14 w1' + k24 w2' + G w4' - d14 w1^2 - d24 w2^2
 //! ```
 //!
-//! and `tau1 = f1 + f2 + f4`, `tau2 = f2 + f4`, `tau4 = -f4` take the efforts back to the joints. Gravity acts along the lift
-//! alone. Every body may have its centre of mass off its axis, the payload too.
+//! and `tau1 = f1 + f2 + f4`, `tau2 = f2 + f4`, `tau4 = -f4` map the efforts back to the joints. Gravity acts along the
+//! lift alone. Every body, including the payload, may have its centre of mass off its axis.
 //!
 //! The paper's eq. 40 to 43 describe a vertical arm of three revolute joints and are not used.
 //!
 //! # Accuracy
 //!
 //! Take the equations above with every coefficient, sine, cosine, speed and acceleration replaced by its magnitude (sine
-//! and cosine by 1) and every minus by a plus. An effort is off by at most 32 u times the value that gives:
-//! a lumped coefficient carries 10 roundings at most, sine and cosine of a difference of angles 2.5 u four times and two
-//! roundings (9 u, as a fraction of 1: see [`Trig`]), the square of an absolute rate 5, and the sums 8.
-//! This is for exact inputs; an angle off by e adds e times the same value.
+//! and cosine by 1) and every minus by a plus. The error of an effort is at most 32 u times the resulting value:
+//! a lumped coefficient carries at most 10 roundings, sine and cosine of a difference of angles 2.5 u four times and
+//! two roundings (9 u, as a fraction of 1: see [`Trig`]), the square of an absolute rate 5, and the sums 8.
+//! This is for exact inputs; an angle error of e adds e times the same value.
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
 use crate::mechanics::arm::{ArmModel, Payload};
 use crate::mechanics::kinematics::Trig;
 
-/// The dynamics of one arm with one payload, in the lumped coefficients that the equations need. Build it anew when the
-/// payload changes; it is cheap, but not meant for every tick.
+/// The dynamics of one arm with one payload, in the lumped coefficients of the equations. Rebuild it when the
+/// payload changes; that is cheap, but not meant for every tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lagrange {
-    /// A, B, G: inertia about their own axes of arm 1, arm 2 and tool, each with the mass that hangs on its end (kg m^2).
+    /// A, B, G: inertia about their own axes of arm 1, arm 2 and tool, each with the mass carried at its end (kg m^2).
     inertia: Vector3<f32>,
     /// Coefficients of cos and of sin in k12(theta2).
     arm1_arm2: Coupling,
@@ -54,8 +54,8 @@ pub struct Lagrange {
     weight: f32,
 }
 
-/// Inertial coupling of two bodies, `k(angle) = x cos - y sin` (kg m^2): length of the inner body times the first moment
-/// of mass (x, y) of the outer one, turned by the angle between them.
+/// Inertial coupling of two bodies, `k(angle) = x cos - y sin` (kg m^2): length of the inner body times the first
+/// moment of mass (x, y) of the outer one, rotated by the angle between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Coupling {
     x: f32,
@@ -63,7 +63,7 @@ struct Coupling {
 }
 
 impl Coupling {
-    /// The coupling and its derivative by the angle.
+    /// The coupling and its derivative with respect to the angle.
     fn at(&self, sin: f32, cos: f32) -> (f32, f32) {
         (self.x * cos - self.y * sin, -self.x * sin - self.y * cos)
     }
@@ -86,7 +86,7 @@ impl Lagrange {
         let (a1, a2) = (arm.geometry.a1, arm.geometry.a2);
         let [arm1, arm2, carriage, shaft] = &arm.links;
 
-        // Frames 3 and 4 have y reversed, seen in the frame of arm 2 from above.
+        // Frames 3 and 4 have y reversed relative to the frame of arm 2 with z up.
         let (tool_x, tool_y) = (
             shaft.mass * shaft.com.x + payload.mass * payload.com.x,
             -(shaft.mass * shaft.com.y + payload.mass * payload.com.y),
@@ -166,7 +166,7 @@ impl Lagrange {
         mass
     }
 
-    /// Coriolis matrix C of Christoffel symbols, for which `M' - 2 C` is skew-symmetric.
+    /// Coriolis matrix C from Christoffel symbols, so that `M' - 2 C` is skew-symmetric.
     ///
     /// Paper function; not on the control path.
     #[must_use]
@@ -197,8 +197,8 @@ impl Lagrange {
         )
     }
 
-    /// Gradient of the kinetic energy with respect to q (N m, lift N), which is C^T qd: what the momentum `M qd` gains
-    /// besides the efforts. Zero for the shoulder, on which no inertia depends.
+    /// Gradient of the kinetic energy with respect to q (N m, lift N), which is C^T qd: the rate of the momentum `M qd`
+    /// that no effort causes. Zero for the shoulder, since no inertia depends on it.
     #[must_use]
     pub fn kinetic_gradient(&self, trig: &Trig, qd: &Vector4<f32>) -> Vector4<f32> {
         let Couplings { d12, d14, d24, .. } = self.couplings(trig);
@@ -289,7 +289,7 @@ fn absolute_rates(joint: &Vector4<f32>) -> Vector3<f32> {
     Vector3::new(joint.x, arm2, arm2 - joint.w)
 }
 
-/// Inverse of [`absolute_rates`], the lift put in.
+/// Inverse of [`absolute_rates`], with the lift inserted.
 fn joint_rates(absolute: &Vector3<f32>, lift: f32) -> Vector4<f32> {
     Vector4::new(
         absolute.x,
@@ -299,7 +299,8 @@ fn joint_rates(absolute: &Vector3<f32>, lift: f32) -> Vector4<f32> {
     )
 }
 
-/// Joint efforts from generalised forces on the absolute rates: the transpose of [`absolute_rates`], the lift put in.
+/// Joint efforts from generalised forces on the absolute rates: the transpose of [`absolute_rates`], with the lift
+/// inserted.
 fn joint_efforts(absolute: &Vector3<f32>, lift: f32) -> Vector4<f32> {
     let elbow = absolute.y + absolute.z;
     Vector4::new(absolute.x + elbow, elbow, lift, -absolute.z)

@@ -1,19 +1,19 @@
 //! Dynamics by the recursive Newton-Euler algorithm (Luh, Walker and Paul 1980) in standard Denavit-Hartenberg frames.
 //!
-//! Velocities and accelerations go outwards from the base, forces and moments back inwards, all in three dimensions and
-//! straight from the links. It shares no derivation with [`lagrange`](super::lagrange), against which it stands as the
-//! second opinion, and costs about ten times as much.
+//! Velocities and accelerations propagate outwards from the base, forces and moments back inwards, all in three
+//! dimensions and directly from the links. It shares no derivation with [`lagrange`](super::lagrange), which it checks,
+//! and costs about ten times as much.
 //!
 //! The paper's recursion (eq. 44 to 48) mixes two conventions: its frames are the standard ones, its equations Craig's,
-//! for modified frames. Here a joint rate acts about z of the frame before, moments are taken at the origin of the frame
-//! before, and effort is the part along its z axis. The recursion starts with the base accelerating upwards at g, which the
-//! paper leaves out, so gravity needs no term of its own.
+//! for modified frames. Here a joint rate acts about z of the previous frame, moments are taken at the origin of that
+//! frame, and effort is the component along its z axis. The recursion starts with the base accelerating upwards at g,
+//! which the paper leaves out, so gravity needs no separate term.
 //!
 //! # Accuracy
 //!
-//! An effort is off by at most 106 u (u = 2^-24) times the value that the same recursion gives on lengths, every horizontal vector
-//! replaced by its length and every difference by a sum: 12 roundings a frame on the way out, 12 on the way in, 10 at
-//! the body.
+//! The error of an effort is at most 106 u (u = 2^-24) times the value of the same recursion on lengths, with every
+//! horizontal vector replaced by its length and every difference by a sum: 12 roundings per frame outwards, 12 inwards,
+//! 10 at the body.
 
 use core::ops::Add;
 
@@ -110,7 +110,7 @@ struct Motion {
 }
 
 impl Motion {
-    /// The base at rest under gravity, which feels like accelerating upwards.
+    /// The base at rest under gravity, equivalent to accelerating upwards.
     fn base(gravity: f32) -> Self {
         Self {
             rate: Vector3::zeros(),
@@ -169,7 +169,7 @@ impl Body {
         }
     }
 
-    /// What it takes to move this body with its frame (Newton and Euler).
+    /// Wrench that moves this body with its frame (Newton and Euler).
     fn wrench(&self, motion: &Motion) -> Wrench {
         let force = motion.acceleration_at(&self.com) * self.mass;
         let momentum = self.inertia.component_mul(&motion.rate);
@@ -181,8 +181,8 @@ impl Body {
     }
 }
 
-/// The links in their Denavit-Hartenberg frames, which sit at the far end of a link, where the model gives centres of mass from
-/// the near end. Frame 3 is the exception: it and the joint frame of the carriage are the same.
+/// The links in their Denavit-Hartenberg frames, which are at the far end of a link, while the model gives centres of
+/// mass from the near end. Frame 3 is the exception: it is the joint frame of the carriage.
 fn bodies(links: &[Link; 4], frames: &[LinkFrame; 4]) -> [Body; 4] {
     let [arm1, arm2, carriage, shaft] = *links;
     let [frame1, frame2, _, frame4] = frames;
@@ -191,7 +191,7 @@ fn bodies(links: &[Link; 4], frames: &[LinkFrame; 4]) -> [Body; 4] {
         com,
         inertia: link.inertia,
     };
-    // Frame 2 has y and z reversed; that leaves the principal moments as they are.
+    // Frame 2 has y and z reversed, which does not change the principal moments.
     let arm2_com = Vector3::new(arm2.com.x, -arm2.com.y, -arm2.com.z);
     [
         body(arm1, arm1.com - frame1.offset),
@@ -209,7 +209,7 @@ struct Wrench {
 }
 
 impl Wrench {
-    /// The same wrench in the frame before `frame`.
+    /// The same wrench in the previous frame.
     fn at_joint(&self, frame: &LinkFrame) -> Self {
         Self {
             force: frame.rotation * self.force,

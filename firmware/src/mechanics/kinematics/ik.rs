@@ -1,4 +1,4 @@
-//! Inverse kinematics: the joint position that puts the flange at a pose.
+//! Inverse kinematics: the joint position for a pose of the flange.
 
 use core::f32::consts::TAU;
 use core::fmt;
@@ -9,18 +9,18 @@ use super::Pose;
 use crate::mechanics::arm::{ArmModel, Axis, Geometry, JointLimits};
 use crate::mechanics::math::{atan2, clamp, hypot, sin_cos, sqrt, wrap};
 
-/// How far out of reach a radius may be, as a fraction of the stretched arm, and still count as the boundary: 8 u, half a
-/// micrometre on a metre.
+/// How far out of reach a radius may be and still count as on the boundary, as a fraction of the stretched arm: 8 u,
+/// half a micrometre per metre.
 ///
-/// A pose that the forward kinematics gives for a stretched arm may be that far out: 3.5 u (the errors of sine and
+/// A pose computed by the forward kinematics for a stretched arm may be that far out: 3.5 u (the errors of sine and
 /// cosine together), 2 u of rounding in the coordinates and 2 u in the radius.
 pub const REACH_TOLERANCE: f32 = 4.0 * f32::EPSILON;
 
-/// How far past a limit a solution may be, as a fraction of the range of the axis, and still be put on the limit: 16 u
-/// (5e-6 rad of a shoulder that turns +-150 degrees), so that the pose of an arm that stands on a limit has a solution.
+/// How far past a limit a solution may be and still be clamped to the limit, as a fraction of the range of the axis: 16
+/// u (5e-6 rad for a shoulder that turns +-150 degrees), so that the pose of an arm at a limit has a solution.
 ///
-/// It covers, for the shoulder, two arc tangents at 4 u of at most pi, their difference and its wrap, and the rounding of
-/// the pose seen from the shoulder. It does not cover the ill-conditioned posture next to the stretched arm.
+/// For the shoulder it covers two arc tangents at 4 u of at most pi, their difference and its wrap, and the rounding of
+/// the pose relative to the shoulder. It does not cover the ill-conditioned posture close to the stretched arm.
 pub const LIMIT_TOLERANCE: f32 = 8.0 * f32::EPSILON;
 
 /// Which way the elbow bends: the two postures that reach one pose.
@@ -47,29 +47,29 @@ impl Elbow {
 /// Why a pose has no joint position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IkError {
-    /// The pose or the position to stay near holds an infinity or NaN.
+    /// The pose or the position to stay near contains an infinity or NaN.
     NotFinite,
-    /// Farther out than the stretched arm.
+    /// Beyond the stretched arm.
     TooFar {
         /// Distance from the shoulder axis (m).
         radius: f32,
         /// Greatest distance in reach (m).
         max: f32,
     },
-    /// Closer in than the folded arm.
+    /// Inside the folded arm.
     TooNear {
         /// Distance from the shoulder axis (m).
         radius: f32,
         /// Least distance in reach (m).
         min: f32,
     },
-    /// The arm reaches it, but an axis would pass its limit.
+    /// The arm reaches it, but an axis would exceed its limit.
     Limit {
         /// The first such axis.
         axis: Axis,
         /// Where it would have to go (rad, lift m).
         value: f32,
-        /// The limit it would pass.
+        /// The limit that it would exceed.
         limit: f32,
     },
 }
@@ -88,7 +88,7 @@ impl fmt::Display for IkError {
             ),
             Self::Limit { axis, value, limit } => write!(
                 f,
-                "{axis:?} axis would go to {value}, past its limit {limit}"
+                "{axis:?} axis would have to go to {value}, past its limit {limit}"
             ),
         }
     }
@@ -99,15 +99,15 @@ impl core::error::Error for IkError {}
 /// Joint position for `pose` by geometry alone: no joint limits, theta1 and theta4 in (-pi, pi].
 ///
 /// The half-angle form `tan(theta2 / 2) = sqrt((S^2 - r^2) / (r^2 - D^2))`, with S and D the sum and difference of the
-/// arm lengths, replaces the paper's `cos theta2`, which loses half the digits near the stretched arm. What conditioning remains
-/// is that of the pose itself: a radius off by e moves theta2 by `r e / (a1 a2 sin theta2)`, at most `sqrt(2 r e / (a1
-/// a2))` at full stretch, while the pose it leads to is off by no more than e. The paper's arc tangents have their
-/// arguments in the order (x, y) and its d3 has the wrong sign; both are put right here.
+/// arm lengths, replaces the paper's `cos theta2`, which loses half the digits near the stretched arm. The remaining
+/// conditioning is that of the pose itself: a radius error of e moves theta2 by `r e / (a1 a2 sin theta2)`, at most
+/// `sqrt(2 r e / (a1 a2))` at full stretch, while the error of the resulting pose is at most e. The paper's arc
+/// tangents have their arguments in the order (x, y) and its d3 has the wrong sign; both are corrected here.
 ///
 /// # Errors
 ///
 /// [`IkError::NotFinite`], [`IkError::TooFar`], [`IkError::TooNear`]. A radius out of reach by at most
-/// [`REACH_TOLERANCE`] is taken for the boundary.
+/// [`REACH_TOLERANCE`] counts as on the boundary.
 pub fn solve(geometry: &Geometry, pose: &Pose, elbow: Elbow) -> Result<Vector4<f32>, IkError> {
     let Pose { x, y, z, yaw } = *pose;
     if ![x, y, z, yaw].into_iter().all(f32::is_finite) {
@@ -148,11 +148,12 @@ pub fn solve(geometry: &Geometry, pose: &Pose, elbow: Elbow) -> Result<Vector4<f
     ))
 }
 
-/// Joint position for `pose` within the limits of `arm`, with the wrist on the turn nearest to that of `near`.
+/// Joint position for `pose` within the limits of `arm`, with the wrist turn nearest to that of `near`.
 ///
 /// # Errors
 ///
-/// Those of [`solve`], and [`IkError::Limit`] for the first axis that would pass a limit by more than [`LIMIT_TOLERANCE`].
+/// Those of [`solve`], and [`IkError::Limit`] for the first axis that would exceed a limit by more than
+/// [`LIMIT_TOLERANCE`].
 pub fn inverse(
     arm: &ArmModel,
     pose: &Pose,
@@ -181,7 +182,7 @@ fn nearest_turn(angle: f32, near: f32, lower: f32, upper: f32) -> f32 {
     }
 }
 
-/// `q` with each value that passes a limit by rounding alone put on it.
+/// `q` with each value that exceeds a limit only by rounding clamped to it.
 fn within_limits(q: &Vector4<f32>, limits: &JointLimits) -> Result<Vector4<f32>, IkError> {
     for axis in Axis::ALL {
         let (value, lower, upper) = (axis.of(q), axis.of(&limits.lower), axis.of(&limits.upper));

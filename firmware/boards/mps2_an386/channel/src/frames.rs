@@ -19,7 +19,7 @@ pub fn frame_to_bytes(frame: &CanFrame) -> [u8; FRAME_LEN] {
     bytes
 }
 
-/// Writes a frame as `struct canfd_frame`; bytes beyond its data stay as they were.
+/// Writes a frame as `struct canfd_frame`; bytes beyond its data are left unchanged.
 pub(crate) fn write_frame(frame: &CanFrame, record: &mut [u8; FRAME_LEN]) {
     let (remote, flags) = match frame.kind() {
         FrameKind::Classical { remote } => (remote, 0),

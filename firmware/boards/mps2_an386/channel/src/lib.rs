@@ -1,18 +1,18 @@
-//! What the emulated board and the host that emulates it tell each other, compiled by both of its ends.
+//! Protocol between the emulated board and its host, compiled into both ends.
 //!
-//! Two FIFOs, standard input and output of the emulator, which the board opens through Arm semihosting. At every start the
-//! board says how it ended before ([`greeting`]), the host what the controller is to know and how frames travel
-//! ([`Setup`]), and the board answers once it is ready ([`Reply`]). Then
+//! Two FIFOs, standard input and output of the emulator, which the board opens through Arm semihosting. At every start
+//! the board reports how it ended before ([`greeting`]), the host sends the controller's configuration and how frames
+//! travel ([`Setup`]), and the board answers once it is ready ([`Reply`]). Then
 //!
-//! - [`Channel::Fifo`]: the host asks ([`Request`]) and waits for the answer ([`Reply`]) from then on, and ends the
-//!   conversation by closing its end. This is the path for long comparisons: a round trip takes microseconds.
-//! - [`Channel::Uart`]: frames travel as slcan lines over UART 0, as they would on silicon. An empty line acknowledges a
-//!   frame, after the frames that answer it. `O` opens the bus; `C` closes it, and the board's last [`Reply`] says how
-//!   many bytes its receiver has lost.
+//! - [`Channel::Fifo`]: the host sends a [`Request`] and waits for the [`Reply`], again and again, and ends by closing
+//!   its end. This is the path for long comparisons: a round trip takes microseconds.
+//! - [`Channel::Uart`]: frames travel as slcan lines over UART 0, as they would on silicon. An empty line acknowledges
+//!   a frame, after the frames that answer it. `O` opens the bus; `C` closes it, and the board's last [`Reply`] has the
+//!   number of bytes that its receiver has lost.
 //!
-//! A Feedback frame on its way to the board is written into a [`Request`] by `plant-sim`, read by the board's loop, handed
-//! to the node, and answered by a [`Reply`] with the Command in it; over the UART it is a line that interrupts put into the
-//! [`ring`]. `plant-sim` (qemu, crash, cost) is one caller, the images of mps2_an386 are the other.
+//! A Feedback frame on its way to the board is written into a [`Request`] by `plant-sim`, read by the board's loop,
+//! passed to the node, and answered by a [`Reply`] with the Command in it; over the UART it is a line that interrupts
+//! put into the [`ring`]. One end is in `plant-sim` (qemu, crash, cost), the other in the images of mps2_an386.
 //!
 //! Every record from the host has a fixed length. Numbers are little-endian, frames in records are in the layout of
 //! Linux's `struct canfd_frame`.
@@ -46,12 +46,12 @@ pub use reply::{
 };
 pub use request::{Fault, REQUEST_LEN, Request};
 
-/// FIFO that the host writes and the board reads. Both can be opened again after a reset.
+/// FIFO that the host writes and the board reads. Both can be reopened after a reset.
 pub const TO_BOARD: &CStr = c"/dev/stdin";
 /// FIFO that the board writes and the host reads.
 pub const FROM_BOARD: &CStr = c"/dev/stdout";
 
-/// Bytes of the setup record; more than any setup takes, the rest is zero.
+/// Bytes of the setup record, more than any setup takes; the rest is zero.
 pub const SETUP_LEN: usize = 768;
 
 /// How frames travel between host and board.
@@ -64,12 +64,12 @@ pub enum Channel {
     Uart,
 }
 
-/// What the host tells the board before anything else.
+/// Setup that the host sends to the board first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
     /// How frames travel.
     pub channel: Channel,
-    /// What the controller is to know.
+    /// Configuration of the controller.
     pub config: Config,
 }
 

@@ -1,4 +1,4 @@
-//! What the board says: a greeting at its start, then an answer to every request.
+//! Output of the board: a greeting at its start, then a reply to every request.
 
 use firmware::cabinet::reset::Stop;
 use firmware::control::phase::Phase;
@@ -9,9 +9,9 @@ use protocol::messages::ResetReason;
 use crate::frames::{FRAME_LEN, write_frame};
 use crate::put;
 
-/// Bytes of a reply before its frames: their number (4), a measured number (4), and one for each phase (4).
+/// Bytes of a reply before its frames: their number (4), a measured number (4), and one per phase (4).
 pub const REPLY_HEADER: usize = 8 + 4 * PHASES;
-/// Bytes of a greeting: where a reply has its number of frames, a number that none has; then, after a header's length,
+/// Bytes of a greeting: an impossible number in place of a reply's number of frames; then, after a header's length,
 /// reason of the start (1), pins (2), reserved (1), address (4), status (4).
 pub const GREETING_LEN: usize = REPLY_HEADER + 12;
 /// Frames that one poll may send: one control sample sends a handful, its reply queue at most eight more.
@@ -20,12 +20,12 @@ pub const REPLY_FRAMES: usize = 16;
 /// Phases of a call of the node.
 const PHASES: usize = Phase::ALL.len();
 
-/// What a request has measured.
+/// Measurements of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Measured {
-    /// Timer ticks of a call of the node, or the number that was asked for.
+    /// Timer ticks of a call of the node, or the number requested.
     pub number: u32,
-    /// Timer ticks of each phase of the call; zeros from an image that does not tell them apart.
+    /// Timer ticks of each phase of the call; zeros from an image that does not measure phases.
     pub phases: [u32; PHASES],
 }
 
@@ -45,7 +45,7 @@ impl From<()> for Measured {
     }
 }
 
-/// What the node sent in one call, as a record that grows.
+/// Frames that the node sent in one call, as a growing record.
 #[derive(Clone, Debug)]
 pub struct Reply {
     bytes: [u8; REPLY_HEADER + REPLY_FRAMES * FRAME_LEN],
@@ -59,7 +59,7 @@ impl Default for Reply {
 }
 
 impl Reply {
-    /// No frame.
+    /// A reply without frames.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -68,7 +68,7 @@ impl Reply {
         }
     }
 
-    /// Forgets all frames.
+    /// Removes all frames.
     pub fn clear(&mut self) {
         self.frames = 0;
     }
@@ -89,7 +89,7 @@ impl Reply {
         Ok(())
     }
 
-    /// The record, with what the request has measured.
+    /// The record, with the measurements of the request.
     pub fn finish(&mut self, measured: &Measured) -> &[u8] {
         let numbers = [self.frames as u32, measured.number];
         let words = numbers.iter().chain(&measured.phases);
@@ -102,7 +102,7 @@ impl Reply {
     }
 }
 
-/// Number of frames and what has been measured, in the header of a reply.
+/// Number of frames and the measurements in the header of a reply.
 #[must_use]
 pub fn reply_header(header: &[u8; REPLY_HEADER]) -> (u32, Measured) {
     let mut words = header
@@ -117,10 +117,10 @@ pub fn reply_header(header: &[u8; REPLY_HEADER]) -> (u32, Measured) {
     (frames, Measured { number, phases })
 }
 
-/// Number of frames that no reply has.
+/// Impossible number of frames, marking a greeting.
 const GREETING: u32 = u32::MAX;
 
-/// What the board says at every start: how it ended before.
+/// Greeting of the board at every start: how it ended before.
 #[must_use]
 pub fn greeting(last: &Stop) -> [u8; GREETING_LEN] {
     let mut bytes = [0; GREETING_LEN];
@@ -132,7 +132,7 @@ pub fn greeting(last: &Stop) -> [u8; GREETING_LEN] {
     bytes
 }
 
-/// Whether what follows this header is the rest of a greeting, and not a reply.
+/// Whether this is the header of a greeting instead of a reply.
 #[must_use]
 pub fn is_greeting(header: &[u8; REPLY_HEADER]) -> bool {
     reply_header(header).0 == GREETING

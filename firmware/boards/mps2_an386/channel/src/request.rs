@@ -1,4 +1,4 @@
-//! What the host asks the board for.
+//! Requests of the host to the board.
 
 use protocol::frame::CanFrame;
 use protocol::time::Instant;
@@ -9,23 +9,23 @@ use crate::put;
 /// Bytes of a request: kind (1), time in ns (8), frame.
 pub const REQUEST_LEN: usize = 9 + FRAME_LEN;
 
-/// What the host asks for.
+/// A request of the host.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// Call the node. The answer holds what it sent, and the timer ticks that it took.
+    /// Call the node. The answer has the frames that it sent and the timer ticks that it took.
     Poll {
         /// Time.
         now: Instant,
-        /// The frame that has come, if any.
+        /// The frame that has arrived, if any.
         frame: Option<CanFrame>,
     },
-    /// Report the most stack used so far: an answer without frames, with bytes instead of ticks.
+    /// Report the most stack used so far: an answer without frames, in bytes instead of ticks.
     Stack,
-    /// Fail. There is no answer but the greeting of the next start.
+    /// Fail. The only answer is the greeting of the next start.
     Plant(Fault),
 }
 
-/// A fault that the image made for it plants into itself.
+/// A fault that the image with planted faults causes on request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Fault {

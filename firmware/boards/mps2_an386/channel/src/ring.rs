@@ -5,11 +5,11 @@ use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 /// Bytes that may wait: three of the longest slcan lines. A power of two, so that the counts below may wrap.
 pub const CAPACITY: usize = 512;
 
-/// Queue of at most [`CAPACITY`] bytes for one writer and one reader. What does not fit is counted and lost.
+/// Queue of at most [`CAPACITY`] bytes for one writer and one reader. Bytes that do not fit are dropped and counted.
 #[derive(Debug)]
 pub struct Ring {
     bytes: [AtomicU8; CAPACITY],
-    /// Bytes ever written and ever read; their difference is what waits.
+    /// Bytes ever written and ever read; the difference is the number waiting.
     written: AtomicUsize,
     read: AtomicUsize,
     lost: AtomicUsize,
@@ -40,7 +40,7 @@ impl Ring {
         match self.bytes.get(written % CAPACITY) {
             Some(place) if waiting < CAPACITY => {
                 place.store(byte, Ordering::Relaxed);
-                // The byte is there before the reader may see it.
+                // The byte is stored before the reader may see it.
                 self.written
                     .store(written.wrapping_add(1), Ordering::Release);
             }
@@ -48,7 +48,7 @@ impl Ring {
         }
     }
 
-    /// Counts a byte that was lost before it came here. For the writer.
+    /// Counts a byte that was lost before it got here. For the writer.
     pub fn lose(&self) {
         let lost = self.lost.load(Ordering::Relaxed);
         self.lost.store(lost.saturating_add(1), Ordering::Relaxed);
@@ -61,12 +61,12 @@ impl Ring {
             return None;
         }
         let byte = self.bytes.get(read % CAPACITY)?.load(Ordering::Relaxed);
-        // The place is free only once the byte has left it.
+        // The slot is free only once the byte has been read.
         self.read.store(read.wrapping_add(1), Ordering::Release);
         Some(byte)
     }
 
-    /// Whether nothing waits.
+    /// Whether no byte waits.
     pub fn is_empty(&self) -> bool {
         self.read.load(Ordering::Relaxed) == self.written.load(Ordering::Acquire)
     }

@@ -1,4 +1,4 @@
-//! Whatever one end of the channel says, the other understands.
+//! Whatever one end of the channel writes, the other reads back.
 
 use channel::{
     Channel, FRAME_LEN, Fault, Measured, REPLY_FRAMES, REPLY_HEADER, Reply, Request, Setup,

@@ -1,8 +1,8 @@
 //! The board as a serial-line CAN adapter with a controller behind it.
 //!
-//! A frame is acknowledged by an empty line once the controller has looked at it; the frames it sent come before. So a
-//! host in lock-step knows when all is said; so is the opening of the bus, after what a node says when it starts. Time is
-//! that of the drives' samples.
+//! A frame is acknowledged by an empty line once the controller has processed it, after the frames that it sent in
+//! answer. So a host in lock-step knows when it has them all. The opening of the bus is acknowledged too, after the
+//! frames that a node sends at its start. Time is counted in samples of the drives.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -18,7 +18,7 @@ use super::pins::Pins;
 use super::settle;
 use super::uart::{FRAMES, RECEIVED};
 
-/// Wraps of SysTick, 2^24 counts of 40 ns each, without a byte after which the host has gone: 20 s.
+/// Wraps of SysTick (2^24 counts of 40 ns) without a byte after which the host counts as gone: 20 s.
 const SILENCE: u32 = 30;
 
 /// Wraps of SysTick since the start.
@@ -31,7 +31,7 @@ pub(crate) fn wrapped() {
     WRAPS.store(wraps.wrapping_add(1), Ordering::Relaxed);
 }
 
-/// Speaks slcan until the host closes the bus or is silent for [`SILENCE`].
+/// Serves slcan until the host closes the bus or is silent for [`SILENCE`].
 #[inline(never)]
 pub(crate) fn serve(node: &mut Node, pins: &mut Pins, journal: &mut Journal, period: Period) {
     let mut clock = SampleClock::new(period);
@@ -55,7 +55,7 @@ pub(crate) fn serve(node: &mut Node, pins: &mut Pins, journal: &mut Journal, per
                 Line::Empty
             }
             Some(Ok(Line::Close)) if open => return,
-            // The bit rates are those of an emulated bus.
+            // An emulated bus has no bit rates to set.
             Some(Ok(Line::Empty | Line::Close | Line::Bitrate(_) | Line::DataBitrate(_))) => {
                 Line::Empty
             }
@@ -65,14 +65,14 @@ pub(crate) fn serve(node: &mut Node, pins: &mut Pins, journal: &mut Journal, per
     }
 }
 
-/// Sleeps until there is a byte; `None` when the host has gone.
+/// Sleeps until there is a byte; `None` when the host is gone.
 fn next_byte() -> Option<u8> {
     let since = WRAPS.load(Ordering::Relaxed);
     while WRAPS.load(Ordering::Relaxed).wrapping_sub(since) <= SILENCE {
         if let Some(byte) = RECEIVED.pop() {
             return Some(byte);
         }
-        // With interrupts held back: one that comes after the look ends the sleep all the same, and is taken after it.
+        // With interrupts masked: one that arrives after the check still ends the sleep, and is handled after it.
         cortex_m::interrupt::free(|_| {
             if RECEIVED.is_empty() {
                 cortex_m::asm::wfi();
@@ -82,7 +82,7 @@ fn next_byte() -> Option<u8> {
     None
 }
 
-/// The node's way out.
+/// The node's transmit side.
 struct Uart;
 
 impl Transmit for Uart {

@@ -1,13 +1,13 @@
 //! Files of the host, by Arm semihosting (*Semihosting for AArch32 and AArch64*, Arm ABI documents).
 //!
-//! The crates for this offer files that can panic, which this image must not.
+//! The existing crates offer files that can panic, which this image must not.
 
 use core::ffi::CStr;
 
 use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
 use cortex_m_semihosting::{nr, syscall};
 
-/// The host has gone, or speaks another language.
+/// The host is gone, or uses another protocol version.
 pub(crate) struct End;
 
 /// Modes of `SYS_OPEN`: those of `fopen`, numbered.
@@ -30,14 +30,15 @@ impl File {
 
     fn with_mode(path: &CStr, mode: usize) -> Result<Self, End> {
         let block = [path.as_ptr() as usize, mode, path.count_bytes()];
-        // SAFETY: SYS_OPEN takes address of a name that ends in zero, mode and length of the name, and only reads it.
+        // SAFETY: SYS_OPEN takes the address of a zero-terminated name, the mode and the length of the name, and only
+        // reads them.
         match unsafe { syscall(nr::OPEN, &block) } {
             usize::MAX => Err(End),
             handle => Ok(Self(handle)),
         }
     }
 
-    /// Fills `buffer`; blocks until that many bytes have come.
+    /// Fills `buffer`; blocks until that many bytes have arrived.
     pub(crate) fn read(&self, buffer: &mut [u8]) -> Result<(), End> {
         let mut rest = buffer;
         while !rest.is_empty() {
@@ -70,7 +71,7 @@ pub(crate) fn exit(result: Result<(), End>) -> ! {
         Ok(()) => EXIT_SUCCESS,
         Err(End) => EXIT_FAILURE,
     });
-    // Only a debugger that lets the program go on gets here.
+    // Reached only if a debugger lets the program continue.
     loop {
         cortex_m::asm::wfi();
     }

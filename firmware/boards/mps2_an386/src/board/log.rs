@@ -1,4 +1,4 @@
-//! The log: defmt over UART 1, which the emulator writes to a file. The UART of the frames does not see it.
+//! The log: defmt over UART 1, which the emulator writes to a file, separate from the UART of the frames.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -23,11 +23,11 @@ unsafe impl Sync for Shared {}
 
 static ENCODER: Shared = Shared(UnsafeCell::new(Encoder::new()));
 
-/// Whether interrupts are to be on again after the message.
+/// Whether to enable interrupts again after the message.
 static RESUME: AtomicBool = AtomicBool::new(false);
 
 /// # Safety
-/// Between `acquire` and `release`, as the logger's functions themselves.
+/// Only between `acquire` and `release`, like the logger's functions themselves.
 unsafe fn encode(what: impl FnOnce(&mut Encoder)) {
     // SAFETY: nothing interrupts a message, and no message is written while another one is.
     what(unsafe { &mut *ENCODER.0.get() });
@@ -46,7 +46,7 @@ unsafe impl Logger for Log {
     unsafe fn flush() {}
 
     unsafe fn release() {
-        // SAFETY: acquired, as the caller has promised. Interrupts were on before, if they are to be on again.
+        // SAFETY: acquired, as the caller has promised. Interrupts are enabled only if they were before.
         unsafe {
             encode(|encoder| encoder.end_frame(|bytes| LOG.send(bytes)));
             if RESUME.load(Ordering::Relaxed) {

@@ -1,5 +1,5 @@
 //! The pins of the cabinet, on the LEDs of the board: register CFG1 of its configuration controller (AN386, SCC), bits 0
-//! to 3. What is written can be read back, in QEMU as on the board.
+//! to 3. Written values can be read back, in QEMU as on the board.
 
 use core::convert::Infallible;
 use core::ptr;
@@ -24,7 +24,7 @@ pub(crate) fn cabinet() -> Pins {
     }
 }
 
-/// For whatever has failed.
+/// For the fault handlers of `cortex_m4`.
 #[unsafe(no_mangle)]
 fn board_torque_off() -> [u8; 2] {
     let found = read();
@@ -51,7 +51,7 @@ impl OutputPin for Led {
     }
 }
 
-/// The emergency-stop chain: QEMU models no button of the board, so that it is always closed.
+/// The emergency-stop chain: QEMU models no button of the board, so it is always closed.
 pub(crate) struct Closed;
 
 impl ErrorType for Closed {
@@ -74,6 +74,7 @@ fn read() -> u32 {
 }
 
 fn write(leds: u32) {
-    // SAFETY: a register of the board that nothing else uses. It is written by the main loop, and by what ends it for good.
+    // SAFETY: a register of the board that nothing else uses. It is written by the main loop, and by the fault
+    // handlers that end it for good.
     unsafe { ptr::write_volatile(LEDS, leds) }
 }

@@ -1,8 +1,8 @@
-//! How much stack has been used: the start-up code paints it, whatever was called has overwritten the paint.
+//! Stack usage: the start-up code paints the stack, and calls overwrite the paint.
 
 use core::ptr;
 
-/// What `cortex-m-rt` paints with.
+/// Value that `cortex-m-rt` paints with.
 const PAINT: u32 = 0xCCCC_CCCC;
 
 unsafe extern "C" {
@@ -14,8 +14,8 @@ unsafe extern "C" {
 pub(crate) fn used() -> usize {
     let top = &raw const _stack_start;
     let mut lowest = &raw const _stack_end;
-    // SAFETY: the linker script puts the stack between these symbols, aligned to words. Words of it are read only, and
-    // as volatile, since live frames above change behind the compiler's back.
+    // SAFETY: the linker script puts the stack between these symbols, aligned to words. They are only read,
+    // and as volatile, since the live frames above change without the compiler's knowledge.
     while lowest < top && unsafe { ptr::read_volatile(lowest) } == PAINT {
         lowest = lowest.wrapping_add(1);
     }

@@ -1,6 +1,6 @@
 //! The UARTs of the board: Arm's CMSDK APB UART (*Cortex-M System Design Kit*, DDI 0479, 4.3).
 //!
-//! Bytes that come interrupt; what goes out waits for room in the one-byte transmit buffer.
+//! Received bytes raise an interrupt; sending waits for room in the one-byte transmit buffer.
 
 use core::ptr;
 
@@ -8,13 +8,13 @@ use channel::ring::Ring;
 
 /// UART 0, which carries frames.
 pub(crate) const FRAMES: Uart = Uart(0x4000_4000);
-/// UART 1, which carries the log. It is only sent to.
+/// UART 1, which carries the log. Transmit only.
 pub(crate) const LOG: Uart = Uart(0x4000_5000);
 
-/// Interrupt that a byte received by UART 0 raises.
+/// Interrupt raised by a byte that UART 0 has received.
 pub(crate) const RECEIVE_IRQ: i16 = 0;
 
-// Registers, by their distance from the first.
+// Registers, as offsets from the first.
 const DATA: usize = 0x0;
 const STATE: usize = 0x4;
 const CTRL: usize = 0x8;
@@ -32,7 +32,7 @@ const INT_RX: u32 = 1 << 1;
 /// Smallest divider: 25 MHz / 16.
 const FASTEST: u32 = 16;
 
-/// Bytes that UART 0 has received and nobody has taken yet.
+/// Bytes received by UART 0 and not yet taken.
 pub(crate) static RECEIVED: Ring = Ring::new();
 
 /// A UART, by its address. Only the two above exist.

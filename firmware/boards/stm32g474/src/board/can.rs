@@ -1,4 +1,4 @@
-//! FDCAN1: 1 Mbit/s nominal, 5 Mbit/s data, with hardware filters for what the node listens to.
+//! FDCAN1: 1 Mbit/s nominal, 5 Mbit/s data, with hardware filters for the messages that the node needs.
 
 use core::num::{NonZeroU8, NonZeroU16};
 
@@ -26,11 +26,11 @@ pub(crate) type Received = RxFdBuf<RECEIVED>;
 /// Queue of frames to be sent.
 pub(crate) type ToSend = TxFdBuf<TO_SEND>;
 
-/// Frames that may wait between interrupt and loop, besides three in the hardware either way.
+/// Frames that may wait between interrupt and loop, besides three in hardware in each direction.
 const RECEIVED: usize = 16;
 const TO_SEND: usize = 8;
 
-/// What the node listens to. Everything else, extended and remote frames included, stops at the filters.
+/// Messages that the node needs. The filters block everything else, including extended and remote frames.
 const FILTERS: [(StandardFilterSlot, u16); 6] = [
     (StandardFilterSlot::_0, table::NMT.id),
     (StandardFilterSlot::_1, table::ESTOP.id),
@@ -96,7 +96,7 @@ impl Can {
                 .set_data_bit_timing(DATA)
                 .set_frame_transmit(FrameTransmissionConfig::AllowFdCanAndBRS)
                 .set_global_filter(GlobalFilter::reject_all())
-                // By identifier: what waits longest must not hold back what is most urgent.
+                // By identifier: the oldest frame must not hold back the most urgent one.
                 .set_tx_buffer_mode(TxBufferMode::Priority)
                 .set_automatic_bus_off_recovery(true),
         );
@@ -111,8 +111,8 @@ impl Can {
     }
 }
 
-/// Transceiver delay compensation (ISO 11898-1, 11.3.3): at 5 Mbit/s a bit is shorter than the way to the bus and back.
-/// The driver has no setting for it, and writes the registers when it starts.
+/// Transceiver delay compensation (ISO 11898-1, 11.3.3): at 5 Mbit/s a bit is shorter than the delay to the bus and
+/// back. The driver has no setting for it and writes the registers when it starts.
 fn compensate_delay() {
     let can = pac::FDCAN1;
     can.cccr().modify(|w| w.set_init(true));
@@ -120,17 +120,17 @@ fn compensate_delay() {
     can.cccr().modify(|w| w.set_cce(true));
     can.tdcr().write(|w| w.set_tdco(DELAY_OFFSET));
     can.dbtp().modify(|w| w.set_tdc(true));
-    // Clears CCE, too.
+    // Also clears CCE.
     can.cccr().modify(|w| w.set_init(false));
 }
 
 /// The node's end of the bus.
 pub(crate) struct Port {
     can: Can,
-    /// A frame taken from the queue to see whether there is one.
+    /// A frame already taken from the queue by [`Self::has_frames`].
     next: Option<CanFrame>,
     estop: bool,
-    /// The emergency-stop chain has opened, and the node does not know yet.
+    /// The emergency-stop chain has opened, and the node has not been notified yet.
     estop_due: bool,
     offline: bool,
 }
@@ -146,8 +146,8 @@ impl Port {
         }
     }
 
-    /// Notes the emergency-stop chain. While it is open the node hears so in every call; the other nodes hear it once,
-    /// and from then on by the state.
+    /// Notes the emergency-stop chain. While it is open the node is notified in every call, the other nodes once; after
+    /// that they see it in the state.
     pub(crate) fn set_estop(&mut self, pressed: bool) {
         if pressed && !self.estop {
             defmt::warn!("emergency-stop chain open");
@@ -161,7 +161,7 @@ impl Port {
 
     /// Whether a frame is waiting.
     pub(crate) fn has_frames(&mut self) -> bool {
-        // The queue holds frames and, in between, errors of the bus, which the controller deals with by itself.
+        // The queue holds frames interspersed with bus errors, which the CAN controller handles by itself.
         while self.next.is_none() {
             match self.can.reader.try_receive() {
                 Ok(Ok(envelope)) => self.next = from_driver(&envelope.frame),
@@ -211,7 +211,7 @@ fn estop_frame() -> Option<CanFrame> {
     codec::encode(&Message::EStop(estop), 0).ok()
 }
 
-/// A frame as received; `None` for a remote frame, which the filters do not let through.
+/// A frame as received; `None` for a remote frame, which the filters block.
 fn from_driver(frame: &FdFrame) -> Option<CanFrame> {
     let header = frame.header();
     let data = frame.data().get(..usize::from(header.len()))?;

@@ -18,8 +18,8 @@ pub(crate) const CYCLES_PER_TICK: u32 = 160_000;
 /// Periods since the start.
 pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
 
-/// 24 MHz crystal / 6 * 80 = 320 MHz; / 2 for the core, / 4 for FDCAN. 80 MHz is what CiA 601-3 recommends, and the
-/// core's 160 MHz are a multiple of it and within its 170 MHz.
+/// 24 MHz crystal / 6 * 80 = 320 MHz; / 2 for the core, / 4 for FDCAN. CiA 601-3 recommends 80 MHz;
+/// the core's 160 MHz is a multiple of it and below its limit of 170 MHz.
 pub(crate) fn config() -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hse = Some(Hse {
@@ -41,7 +41,7 @@ pub(crate) fn config() -> embassy_stm32::Config {
     config
 }
 
-/// What time it is for the node. A resolution of one sample is enough: the node measures time-outs of many.
+/// The node's time. A resolution of one sample is enough: the node's time-outs are many samples long.
 pub(crate) struct Clock {
     seen: u32,
     now: Instant,
@@ -65,12 +65,12 @@ impl Clock {
         }
     }
 
-    /// Whether the timer has fired and has not been looked at.
+    /// Whether the timer has fired since the last [`Self::advance`].
     pub(crate) fn is_due(&self) -> bool {
         TICKS.load(Ordering::Relaxed) != self.seen
     }
 
-    /// Takes note of the time; `true` if it has moved on.
+    /// Updates the time; `true` if it has advanced.
     pub(crate) fn advance(&mut self) -> bool {
         let ticks = TICKS.load(Ordering::Relaxed);
         let passed = ticks.wrapping_sub(self.seen);
@@ -79,7 +79,7 @@ impl Clock {
         passed != 0
     }
 
-    /// Time noted last.
+    /// Time of the last update.
     pub(crate) fn now(&self) -> Instant {
         self.now
     }
