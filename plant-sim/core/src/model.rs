@@ -23,8 +23,8 @@ const BUILT_IN: [(&str, &str); 2] = [
     ),
 ];
 
-/// Everything the simulator knows about a robot.
-#[derive(Clone, Debug, PartialEq)]
+/// Everything the simulator knows about a robot. Equal are robots of the same name and numbers, wherever those are from.
+#[derive(Clone, Debug)]
 pub struct RobotModel {
     /// Free text.
     pub name: String,
@@ -172,6 +172,28 @@ pub enum ModelErrorKind {
     },
 }
 
+impl PartialEq for RobotModel {
+    fn eq(&self, other: &Self) -> bool {
+        let Self {
+            name,
+            gravity,
+            geometry,
+            limits,
+            links,
+            drive,
+            payload_max,
+            source: _,
+        } = self;
+        *name == other.name
+            && *gravity == other.gravity
+            && *geometry == other.geometry
+            && *limits == other.limits
+            && *links == other.links
+            && *drive == other.drive
+            && *payload_max == other.payload_max
+    }
+}
+
 impl RobotModel {
     /// The default robot: IRB 930-22/1.05.
     pub fn irb_930_22_105() -> Self {
@@ -194,15 +216,6 @@ impl RobotModel {
     /// Whether this is the text of a model that comes with the program.
     pub fn is_built_in(text: &str) -> bool {
         BUILT_IN.iter().any(|(_, known)| *known == text)
-    }
-
-    /// Whether both are the same robot, wherever their numbers are from.
-    pub fn is_same(&self, other: &Self) -> bool {
-        let source = other.source.clone();
-        Self {
-            source,
-            ..self.clone()
-        } == *other
     }
 
     /// Reads the text of a model file. Where the text is from, `source.origin`, is left to the caller.

@@ -72,7 +72,7 @@ fn difference(config: &RunConfig, text: &mut String) {
             "the controller is made for {}",
             config.nominal.name
         ));
-    } else if !config.nominal.is_same(&config.actual) {
+    } else if config.nominal != config.actual {
         wrong.push("the controller's model of it has other numbers".into());
     }
     if mismatch.friction != 1.0 {
