@@ -149,6 +149,6 @@ fn a_controller_that_goes_away_is_a_result() {
     .unwrap();
     thread.join().unwrap();
     let error = summary.error.unwrap();
-    assert!(error.contains("silent since"), "{error}");
+    assert!(error.contains("has been silent since"), "{error}");
     assert!(summary.at_rest);
 }

@@ -225,7 +225,7 @@ fn a_clock_that_was_set_is_named_and_can_be_left_out() {
         "{text}"
     );
     assert!(
-        text.contains("1 records are earlier than one before, by up to 1719999991.100000 s"),
+        text.contains("1 records are earlier than a previous one, by up to 1719999991.100000 s"),
         "{text}"
     );
     let (_, json, _) = trace("clock.log", log, &["stats", "--json", "--skip-gaps", "60"]);

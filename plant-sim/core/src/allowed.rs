@@ -1,12 +1,12 @@
-//! What a number in an input may be.
+//! Allowed values of numbers in inputs.
 
 use std::fmt;
 
-/// What a number may be: finite, and in a range.
+/// Allowed values of a number: finite and in a range.
 #[derive(Clone, Copy)]
 pub(crate) struct Allowed {
     low: f64,
-    /// Whether `low` itself is out.
+    /// Whether `low` itself is excluded.
     above: bool,
     high: f64,
     unit: &'static str,
@@ -36,10 +36,10 @@ impl Allowed {
         }
     }
 
-    /// The number, if it is allowed.
+    /// The number, if allowed.
     ///
     /// # Errors
-    /// What is allowed, and the slip of unit that explains the number, if one does.
+    /// What is allowed, and the mistaken unit that would explain the number, if any.
     pub(crate) fn check(self, number: f64) -> Result<f64, String> {
         if self.admits(number) {
             return Ok(number);
@@ -54,15 +54,15 @@ impl Allowed {
         (self.low..=self.high).contains(&number) && !(self.above && number == self.low)
     }
 
-    /// The slip of unit that explains a number, if one does: thousandths of a metre, or degrees.
+    /// The mistaken unit that would explain a number, if any: millimetres or degrees.
     fn slip(self, number: f64) -> Option<String> {
         match self.unit {
             "m" if self.admits(number / 1000.0) && number.abs() >= 10.0 => Some(format!(
-                "lengths are in m: {number} mm are {}",
+                "lengths are in m: {number} mm is {}",
                 number / 1000.0
             )),
             "rad" if self.admits(number.to_radians()) => Some(format!(
-                "angles are in rad: {number} degrees are {:.6}",
+                "angles are in rad: {number} degrees is {:.6}",
                 number.to_radians()
             )),
             _ => None,
@@ -88,15 +88,15 @@ impl fmt::Display for Allowed {
     }
 }
 
-/// Mass of a payload: what a request can carry.
+/// Mass of a payload, as limited by the message.
 pub(crate) const PAYLOAD_MASS: Allowed = Allowed::within(0.0, 100.0, "kg");
-/// Centre of mass of a payload: what a request can carry.
+/// Centre of mass of a payload, as limited by the message.
 pub(crate) const PAYLOAD_COM: Allowed = Allowed::within(-1.0, 1.0, "m");
-/// Moments of inertia of a payload: what a request can carry.
+/// Moments of inertia of a payload, as limited by the message.
 pub(crate) const PAYLOAD_INERTIA: Allowed = Allowed::within(0.0, 10.0, "kg m2");
 
-/// Holds principal moments of inertia against the triangle inequality: of no body is one greater than the sum of the other
-/// two.
+/// Checks principal moments of inertia against the triangle inequality: no body has one greater than the sum of the
+/// other two.
 ///
 /// # Errors
 /// The axis of the moment that is too great, and what is allowed.

@@ -1,12 +1,11 @@
-//! A CAN bus in the bench: bit-timed, with arbitration, deterministic.
+//! Simulated CAN bus: bit-timed, with arbitration, deterministic.
 //!
-//! Time is an argument. The bus never runs by itself: the caller puts frames in with
-//! [`BuiltinBus::enqueue`], asks with [`BuiltinBus::next_event`] when something happens, and takes what was received
-//! with [`BuiltinBus::pop_delivery`].
+//! Time is an argument. The bus never runs by itself: the caller queues frames with [`BuiltinBus::enqueue`], gets the
+//! time of the next event from [`BuiltinBus::next_event`], and takes received frames with [`BuiltinBus::pop_delivery`].
 //!
-//! What is modelled: exact frame lengths, arbitration bit by bit, non-preemption, interframe space, transmit mailboxes,
-//! identifier collisions. What is not: propagation delay, oscillator tolerance, error frames of other causes and error
-//! counters; those of a node are injected by wrappers around its [`Peer`](crate::peer::Peer).
+//! Modelled: exact frame lengths, arbitration bit by bit, non-preemption, interframe space, transmit mailboxes,
+//! identifier collisions. Not modelled: propagation delay, oscillator tolerance, error frames of other causes and error
+//! counters; errors of a node are injected by wrappers around its [`Peer`](crate::peer::Peer).
 
 mod load;
 
@@ -19,7 +18,7 @@ use protocol::wire::{BitTiming, FrameBits, arbitration_field};
 
 pub use load::{MAX_LOAD, Overload, Traffic, admit, worst_case_load};
 
-/// What an identifier collision costs beyond the frames themselves: superposed error flags (6 to 12 bits) and error
+/// Cost of an identifier collision besides the frames themselves: superposed error flags (6 to 12 bits) and error
 /// delimiter (8).
 const ERROR_FRAME: FrameBits = FrameBits {
     nominal: 12 + 8,
@@ -56,21 +55,20 @@ impl NodeSet {
 /// A frame that arrived at every node but its sender.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delivery {
-    /// When receivers took it as valid: sample point of the last but one bit of end of frame.
+    /// When receivers accepted it as valid: sample point of the last but one bit of end of frame.
     pub time: Instant,
     /// When its start of frame began.
     pub start: Instant,
     /// The frame.
     pub frame: CanFrame,
-    /// The sender; several when nodes sent the very same frame at the same instant, which CAN merges into one.
+    /// The sender; several if nodes sent identical frames at the same instant, which CAN merges into one.
     pub from: NodeSet,
 }
 
 /// Nodes that started different frames with one identifier at the same instant.
 ///
-/// Arbitration cannot separate them, a bit error follows. Real controllers repeat both frames, and collide, until both
-/// are bus-off; here both frames are lost at once. Two nodes with one identifier are an error of configuration, never a
-/// state to run in.
+/// Arbitration cannot separate them, and a bit error follows. Real controllers repeat both frames and collide until
+/// both are bus-off; here both frames are lost at once. Two nodes with the same identifier are a configuration error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Collision {
     /// When the frames started.
@@ -81,19 +79,19 @@ pub struct Collision {
     pub nodes: NodeSet,
 }
 
-/// What the bus carried of one identifier, or of all.
+/// Traffic of one identifier, or of all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Carried {
     /// Frames received.
     pub frames: u64,
-    /// Time they took, interframe space included.
+    /// Time they took, including interframe space.
     pub busy: Duration,
-    /// Longest that one waited from [`BuiltinBus::enqueue`] to its start of frame.
+    /// Longest wait from [`BuiltinBus::enqueue`] to the start of frame.
     pub max_wait: Duration,
 }
 
 impl Carried {
-    /// Share of `elapsed` that the bus was taken, of 1.
+    /// Share of `elapsed` for which the bus was busy, 0 to 1.
     #[must_use]
     pub fn load(&self, elapsed: Duration) -> f64 {
         self.busy.nanos() as f64 / elapsed.nanos().max(1) as f64
@@ -106,7 +104,7 @@ impl Carried {
     }
 }
 
-/// What happened on the bus since it was made.
+/// Statistics of the bus since its creation.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
     /// All frames together.
@@ -129,15 +127,15 @@ struct Mailbox {
     duration: Duration,
 }
 
-/// A node's CAN controller, as the bus sees it.
+/// A node's CAN controller, from the bus's side.
 struct Node {
     capacity: usize,
-    /// In the order they were filled.
+    /// In the order of filling.
     mailboxes: Vec<Mailbox>,
 }
 
 impl Node {
-    /// The mailbox that takes part in an arbitration at `start`: highest priority first, oldest of one identifier.
+    /// The mailbox that takes part in an arbitration at `start`: the highest priority, and the oldest per identifier.
     fn candidate(&self, start: Instant) -> Option<(usize, &Mailbox)> {
         self.mailboxes
             .iter()
@@ -147,7 +145,7 @@ impl Node {
     }
 }
 
-/// The next transmission, as far as it is known.
+/// The next transmission, as far as known.
 struct Transmission {
     start: Instant,
     valid: Instant,
@@ -158,13 +156,13 @@ struct Transmission {
 
 /// The bus and the transmit side of its nodes' controllers.
 ///
-/// A controller sends its mailboxes in the order of their priority (as bxCAN by default, M_CAN in queue mode), frames of
-/// one identifier in the order they came: a FIFO would let a heartbeat delay a command. A mailbox is free again when its
-/// frame is valid for the receivers.
+/// A controller sends its mailboxes in the order of their priority (as bxCAN by default, M_CAN in queue mode), frames
+/// of one identifier in the order of arrival: a FIFO would let a heartbeat delay a command. A mailbox is free again
+/// once its frame is valid for the receivers.
 pub struct BuiltinBus {
     timing: BitTiming,
     nodes: Vec<Node>,
-    /// End of the last intermission: no frame starts before.
+    /// End of the last intermission; no frame starts earlier.
     idle: Instant,
     statistics: Statistics,
 }
@@ -203,8 +201,9 @@ impl BuiltinBus {
 
     /// Puts a frame into a mailbox of `node` at `now`.
     ///
-    /// `now` is not earlier than the last delivery taken, and deliveries up to `now` have been taken: only that frees
-    /// their mailboxes. A frame put in at the very instant another starts takes part in the arbitration; later, it waits.
+    /// `now` must not be earlier than the last delivery taken, and deliveries up to `now` must have been taken, since
+    /// only that frees their mailboxes. A frame queued at the very instant another starts takes part in the
+    /// arbitration; a later one waits.
     ///
     /// # Errors
     /// [`TransmitError::QueueFull`] when every mailbox is occupied; the frame is lost and counted.
@@ -231,8 +230,8 @@ impl BuiltinBus {
         Ok(())
     }
 
-    /// When the transmission that is under way or comes next ends, unless frames put in by then win over it; `None`
-    /// when nothing is to be sent.
+    /// End of the current or next transmission, unless frames queued by then win arbitration; `None` when there is
+    /// nothing to send.
     #[must_use]
     pub fn next_event(&self) -> Option<Instant> {
         self.next_transmission().map(|next| next.valid)
@@ -240,7 +239,7 @@ impl BuiltinBus {
 
     /// The oldest frame received at or before `until` and not yet taken.
     ///
-    /// The caller says with it that nothing more is put in before `until`.
+    /// By calling it the caller promises to queue nothing more before `until`.
     pub fn pop_delivery(&mut self, until: Instant) -> Option<Delivery> {
         // Every round empties a mailbox.
         loop {
@@ -254,16 +253,16 @@ impl BuiltinBus {
         }
     }
 
-    /// What happened so far. A frame counts when it is taken.
+    /// Statistics so far. A frame counts once it is taken.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
         &self.statistics
     }
 
-    /// Arbitration among the frames known by now.
+    /// Arbitration among the frames queued so far.
     ///
-    /// There is no state of a frame under way: frames put in after its start are no candidates, so the answer stays the
-    /// same until it is complete.
+    /// A frame in transmission needs no state: frames queued after its start are not candidates, so the answer stays
+    /// the same until it is complete.
     fn next_transmission(&self) -> Option<Transmission> {
         let oldest = self
             .nodes
@@ -304,7 +303,7 @@ impl BuiltinBus {
         })
     }
 
-    /// Empties the senders' mailboxes and keeps the books; the frame, unless it collided.
+    /// Empties the senders' mailboxes and updates the statistics; returns the frame unless it collided.
     fn complete(&mut self, sent: &Transmission) -> Option<Delivery> {
         self.idle = sent.idle;
         let mut frame = None;

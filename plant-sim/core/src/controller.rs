@@ -12,29 +12,29 @@ use crate::peer::{Outbox, Peer, PeerError};
 use crate::world::Mind;
 use crate::world::World;
 
-/// Time that a controller takes from frame in to frames out: 4000 instructions, the budget of a call, at 100 MHz.
+/// Time of a controller from frame in to frames out: 4000 instructions, the budget of a call, at 100 MHz.
 pub const COMPUTE: Duration = Duration::from_micros(40);
 
-/// Samples without feedback after which the controller is called without a frame: its watchdogs live on that.
+/// Samples without feedback after which the controller is called without a frame, to run its watchdogs.
 const GUARD_SAMPLES: u32 = 2;
 
 /// The controller as a part of this process.
 ///
-/// It counts time in samples, as every controller in lock-step does ([`SampleClock`]): the same frames then lead to the same
-/// answers, in this process, in another and on a board. Where feedback stays away, the time of the caller goes on for it.
+/// It counts time in samples like every controller in lock-step ([`SampleClock`]): the same frames then lead to the
+/// same answers, in this process, in another and on a board. Without feedback, its time follows the caller's.
 #[derive(Debug)]
 pub struct InProcess {
     config: Config,
     node: Node,
     clock: SampleClock,
-    /// When the last feedback came, or the time was looked at.
+    /// Time of the last feedback, or of the last call without one.
     last: Option<Instant>,
-    /// What a call has sent, empty in between.
+    /// Frames sent in the current call; empty between calls.
     sent: Vec<CanFrame>,
 }
 
 impl InProcess {
-    /// A controller that network management has reset: so every run begins, wherever the controller is.
+    /// A controller just reset by network management: every run begins like this, wherever the controller is.
     pub fn new(config: Config) -> Self {
         Self::started(config, ResetReason::Software)
     }
@@ -49,7 +49,7 @@ impl InProcess {
         }
     }
 
-    /// Starts the controller again, for this reason.
+    /// Restarts the controller for this reason.
     pub fn restart(&mut self, reason: ResetReason) {
         *self = Self::started(self.config, reason);
     }
@@ -64,12 +64,12 @@ impl InProcess {
         self.clock.now()
     }
 
-    /// Whether it has started and has not been called yet.
+    /// Whether it has not been called since its start.
     pub fn is_new(&self) -> bool {
         self.last.is_none()
     }
 
-    /// When it is to be called without a frame, on the caller's time line.
+    /// When to call it without a frame, on the caller's time line.
     pub fn due(&self) -> Instant {
         match self.last {
             None => Instant::ORIGIN,
@@ -77,7 +77,8 @@ impl InProcess {
         }
     }
 
-    /// Calls the node at `now` of the caller; appends what it sends. A node that is asked to reset is followed by a new one.
+    /// Calls the node at the caller's time `now`; appends the frames that it sends. A node that has to reset is
+    /// replaced by a new one.
     pub fn call(&mut self, now: Instant, received: Option<&CanFrame>, sent: &mut Vec<CanFrame>) {
         // Never full: the caller takes everything at once.
         let mut send = |frame: &CanFrame| {

@@ -1,7 +1,7 @@
-//! The drive side of the link: samples the plant into feedback, applies commands to it.
+//! The drive side of the link: samples the plant into feedback and applies commands to it.
 //!
-//! It owns the sampling clock. A command acts when it arrives, not when it was due; one that does
-//! not come leaves the last torque for [`HOLD_SAMPLES`], then the drives brake and let go.
+//! It owns the sampling clock. A command acts when it arrives, not when it was due. Without a new one
+//! the last torque is held for [`HOLD_SAMPLES`], then the drives brake and switch torque off.
 
 mod settings;
 
@@ -22,24 +22,24 @@ use crate::plant::Plant;
 use crate::world::World;
 use settings::Settings;
 
-/// Samples for which the last command is held when none comes, unless set otherwise.
+/// Default number of samples for which the last command is held without a new one.
 pub const HOLD_SAMPLES: u32 = DriveParameter::HoldSamples.initial(1.0) as u32;
 
-/// What the drives do with the commands they get.
+/// The drives.
 #[derive(Clone, Debug)]
 pub struct Drives {
     sample: u32,
-    /// When the next sample is taken.
+    /// Time of the next sample.
     next: Instant,
     encoder: Encoder,
     commands: Receiver,
     requests: Receiver,
     settings: Settings,
-    /// The last command asked for more torque than is set.
+    /// Whether the last command exceeded the torque limit that is set.
     cut: bool,
     /// Encoder counts of the last sample.
     previous: Option<[i32; 4]>,
-    /// Radians a count, and the rated torques that feedback is scaled with.
+    /// Radians per count, and the rated torques, the scale of feedback.
     radians_per_count: f64,
     rated: [f64; 4],
     period: Period,
@@ -83,7 +83,7 @@ impl Drives {
             let counts = reading.counts[axis].wrapping_sub(before[axis]);
             velocity[axis] = (f64::from(counts) * self.radians_per_count / period) as f32;
             let per_mille = reading.motor_torque[axis] / self.rated[axis] * 1000.0;
-            // `as` saturates: a drive reports its largest value, not a wrapped one.
+            // `as` saturates: a drive reports its greatest value, not a wrapped one.
             torque[axis] = per_mille.round() as i16;
         }
         let powered = self.control.contains(ControlWord::TORQUE_ENABLE);
@@ -106,7 +106,7 @@ impl Drives {
             .expect("encoder speeds and torques are finite and far inside the ranges")
     }
 
-    /// Takes a command that has just arrived. One that is damaged or not new is as good as none.
+    /// Takes a command that has just arrived. A damaged or old one is ignored.
     fn receive(&mut self, frame: &CanFrame, plant: &mut Plant) {
         if let Ok(received) = codec::decode(frame)
             && let Message::Command(command) = received.message
@@ -116,7 +116,7 @@ impl Drives {
         }
     }
 
-    /// Answers a request of the controller, unless it is damaged or not new. A new value is in force from the next command
+    /// Answers a request of the controller, unless it is damaged or old. A new value takes effect from the next command
     /// or sample on.
     fn answer(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let received = codec::decode(frame).ok()?;
@@ -155,7 +155,7 @@ impl Drives {
         plant.set_brake(!command.control.contains(ControlWord::BRAKE_RELEASE));
     }
 
-    /// Lets go when commands stay away.
+    /// Brakes and switches torque off when commands stop arriving.
     fn guard(&mut self, plant: &mut Plant) {
         let Some(answered) = self.answered else {
             return;

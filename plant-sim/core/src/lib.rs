@@ -2,29 +2,30 @@
 //!
 //! Pure: no file, clock, thread, print or socket. A run is a function of its configuration, the same on every machine.
 //!
-//! # What lives here
+//! # Contents
 //!
 //! ```text
 //! run, setup, summary    a run from configuration to verdict
-//! scenario, selection    what is asked for: motions, law, mismatch
+//! scenario, selection    what to run: motions, law, mismatch
 //! rig                    the time line from event to event
-//! peer                   a node on it: controller (in process or elsewhere), and the two others of a cabinet, drives and
-//!                        operator, which know messages and not the controller
-//! world                  what peers share besides the bus: the robot, and what each lets the run know
-//! observer, record       what a run shows, and its trace and truth as text
+//! peer                   a node on it: controller (in process or elsewhere), drives and operator; the latter two
+//!                        know the controller by its messages alone
+//! world                  what peers share besides the bus: the robot, and what each reports to the run
+//! observer, record       observers of a run, and its trace and truth as text
 //! bus                    arbitration and exact frame times
-//! plant, model           the robot in f64, by a derivation of its own, and its data
+//! plant, model           the robot in f64, derived independently, and its data
 //! metrics                errors, settling, utilisation
 //! ```
 //!
 //! The plant names neither the controller nor the bus.
 //!
-//! # The way of one Feedback frame
+//! # The path of one Feedback frame
 //!
-//! At a sample [`rig`] lets the [`plant`] latch what its sensors see; [`drives`] encodes it and gives it to the [`bus`],
-//! which says when the last bit has arrived. Then the rig delivers it, to observers as well, and the controller's answer,
-//! a Command, travels back as late as computing time and arbitration make it. The drives apply it: the plant is integrated
-//! up to that instant with the old torques and from there with the new ones. [`metrics`] judges the sample by the truth.
+//! At a sample [`rig`] calls the [`drives`], which latch the sensors of the [`plant`] and encode them for the [`bus`];
+//! it determines when the last bit has arrived. Then the rig delivers the frame to the peers and observers, and the
+//! controller's answer, a Command, travels back, delayed by computing time and arbitration. The drives apply it: the
+//! plant is integrated up to that instant with the old torques and from there with the new ones. [`metrics`] evaluates
+//! the true state of the sample.
 
 #![forbid(unsafe_code)]
 #![deny(clippy::disallowed_methods, clippy::print_stdout, clippy::print_stderr)]

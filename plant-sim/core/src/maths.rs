@@ -1,9 +1,10 @@
 //! The elementary functions of the simulation: the same bits on every machine.
 //!
 //! IEEE 754 fixes the result of `+ - * /`, the square root, comparisons and rounding to an integer to the last bit; those
-//! come from the standard library. It fixes no sine: the standard library leaves that to the platform's C library, where
-//! glibc chooses an implementation by processor and WebAssembly has another. The `libm` crate computes these functions
-//! from the operations above alone, always in the same order. `clippy.toml` forbids the others in this crate.
+//! come from the standard library. It does not fix the sine: the standard library leaves that to the platform's C
+//! library, where glibc chooses an implementation by processor and WebAssembly has another. The `libm` crate computes
+//! these functions from the operations above alone, always in the same order. `clippy.toml` forbids the others in this
+//! crate.
 
 /// Sine and cosine of `x` (rad).
 pub(crate) fn sin_cos(x: f64) -> (f64, f64) {

@@ -1,15 +1,16 @@
-//! What a run is judged by, computed from the truth as it streams by.
+//! Metrics of a run, computed from the truth as it streams by.
 //!
-//! - *Cycle time*: from the start of motion until the tool is back where the cycle ends, within 1 mm and 10 mrad, and
-//!   stays there. A move too small to leave that radius ends with its reference.
+//! - *Cycle time*: from the start of motion until the tool is within 1 mm and 10 mrad of the cycle's end and stays
+//!   there. A move too small to leave that radius ends with its reference.
 //! - *Settling time*: from the end of the commanded motion until the tool is within 0.01 mm and 0.1 mrad and stays there,
-//!   the usual definition for a motion axis. An angle counts for what it moves 100 mm from the tool's axis.
+//!   the usual definition for a motion axis. An angle counts as the distance that it moves a point 100 mm from the
+//!   tool's axis.
 //! - *Tracking error*: true tool to commanded tool at the same instant, while the reference moves; position and yaw.
 //! - *Utilisation*: largest torque or speed over its limit; thermal: root mean square over what
 //!   the continuous rating of the motor.
-//! - *Saturation*: longest time for which a motor gave all it can, by axis, as the plant saw it.
+//! - *Saturation*: longest time with a motor at its limit, by axis, according to the plant.
 //!
-//! The target is the one that was asked for, in double precision; the controller gets it rounded.
+//! The target is the requested one in double precision; the controller gets it rounded.
 
 mod cycle;
 mod offset;
@@ -53,7 +54,7 @@ pub struct RmsMax {
     pub max: f64,
 }
 
-/// Everything that is computed from the truth.
+/// All metrics computed from the truth.
 pub struct Metrics {
     arm: Arm,
     limits: Limits,
@@ -71,7 +72,7 @@ pub struct Metrics {
     pub longest_saturation: [u64; 4],
 }
 
-/// Errors of a tool that follows.
+/// Errors of the tool while it follows.
 #[derive(Default)]
 struct Tracking {
     squares: f64,
@@ -123,12 +124,12 @@ impl Metrics {
         }
     }
 
-    /// A cycle that is to end at `target` (x, y, z, yaw) begins with the next sample.
+    /// Begins a cycle with target `target` (x, y, z, yaw) at the next sample.
     pub fn begin_cycle(&mut self, target: Option<[f64; 4]>) {
         self.cycle = Some(Cycle::new(target));
     }
 
-    /// The cycle has ended, dwell included.
+    /// Ends the cycle, dwell included.
     pub fn end_cycle(&mut self) {
         let result = self.cycle.take().and_then(|cycle| cycle.result());
         self.cycles.extend(result);
@@ -165,7 +166,7 @@ impl Metrics {
         self.tracking_mm.spread()
     }
 
-    /// Yaw between true and commanded tool while moving, mrad.
+    /// Yaw error between true and commanded tool while moving, mrad.
     pub fn tracking_error_mrad(&self) -> RmsMax {
         self.tracking_mrad.spread()
     }
@@ -213,18 +214,18 @@ impl Metrics {
         greatest(self.cycles.iter().map(|cycle| cycle.final_error_mm))
     }
 
-    /// Largest yaw away from the target at the end of a dwell, mrad.
+    /// Largest yaw error from the target at the end of a dwell, mrad.
     pub fn final_error_mrad(&self) -> Option<f64> {
         greatest(self.cycles.iter().map(|cycle| cycle.final_error_mrad))
     }
 }
 
-/// The greatest of those that are there.
+/// The greatest of the values present.
 fn greatest(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     values.flatten().reduce(f64::max)
 }
 
-/// `None` unless all are there, and one at least.
+/// `None` if any is missing, or there are none.
 fn spread(values: impl Iterator<Item = Option<f64>>) -> Option<Spread> {
     let values: Vec<f64> = values.collect::<Option<_>>()?;
     let min = values.iter().copied().reduce(f64::min)?;

@@ -1,4 +1,4 @@
-//! The robot as data: what the model file says, checked, in plain types.
+//! The robot as data: the contents of the model file, checked, in plain types.
 //!
 //! SI units throughout; arrays of four are in joint order `[theta1, theta2, d3, theta4]` (rad, rad, m, rad). The joint
 //! frames are: joint 1 at the origin, joint 2 at `(a1, 0, d1)` of link 1, joint 3 at `(a2, 0, d2)` of link 2 turned by
@@ -28,11 +28,11 @@ const BUILT_IN: [(&str, &str); 2] = [
 pub struct RobotModel {
     /// Free text.
     pub name: String,
-    /// Acceleration of gravity along -z of frame 0, m/s2: 9.81 for a robot that stands, negative for one that hangs.
+    /// Acceleration of gravity along -z of frame 0, m/s2: 9.81 for an upright robot, negative for an inverted one.
     pub gravity: f64,
     /// Distances between the axes.
     pub geometry: Geometry,
-    /// What the axes may do.
+    /// Limits of the axes.
     pub limits: JointLimits,
     /// Arm 1, arm 2, carriage, shaft with flange.
     pub links: [Link; 4],
@@ -44,7 +44,7 @@ pub struct RobotModel {
     pub source: Source,
 }
 
-/// Standard Denavit-Hartenberg lengths, m. The twists are always 0, pi, 0, 0: that is what makes the robot a SCARA.
+/// Standard Denavit-Hartenberg lengths, m. The twists are always 0, pi, 0, 0, which makes the robot a SCARA.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
     /// Axis 1 to axis 2.
@@ -59,7 +59,7 @@ pub struct Geometry {
     pub d4: f64,
 }
 
-/// Limits of the joints; torques are of the joint side, axis 3 a force.
+/// Limits of the joints; torques on the joint side, for axis 3 a force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {
     /// Smallest position.
@@ -101,11 +101,11 @@ pub struct DriveTrain {
     pub screw_hand: f64,
     /// Of rotor and gear input, on the motor side, kg m2.
     pub rotor_inertia: [f64; 4],
-    /// Torque that the motor gives at most, N m.
+    /// Peak motor torque, N m.
     pub motor_torque_limit: [f64; 4],
     /// Continuous rating: torque that the motor can hold indefinitely, N m.
     pub motor_torque_rated: [f64; 4],
-    /// Speed up to which the motor gives its full torque, rad/s.
+    /// Speed up to which the motor gives full torque, rad/s.
     pub motor_speed_limit: [f64; 4],
     /// Viscous friction of the joint, N m s/rad and N s/m.
     pub viscous: [f64; 4],
@@ -132,7 +132,7 @@ pub struct Payload {
 #[derive(Debug, Error)]
 #[error("{}{cause}", place.map(|(line, column)| format!("line {line}, column {column}: ")).unwrap_or_default())]
 pub struct ModelError {
-    /// Line and column counted from 1; for something missing, those of the object it is missing from.
+    /// Line and column counted from 1; for a missing key, those of the object that lacks it.
     pub place: Option<(usize, usize)>,
     /// What was wrong.
     pub cause: ModelErrorKind,
@@ -144,7 +144,7 @@ pub enum ModelErrorKind {
     /// The text is not JSON.
     #[error("not JSON: {0}")]
     Syntax(String),
-    /// A key is not there.
+    /// A key is missing.
     #[error("{path} is missing; it must be {expected}")]
     Missing {
         /// JSON path, as in `links[2].mass`.
@@ -152,20 +152,20 @@ pub enum ModelErrorKind {
         /// What is allowed there.
         expected: String,
     },
-    /// A key means nothing here.
+    /// A key is not known.
     #[error("{path} is not known{hint}")]
     Unknown {
         /// JSON path, as in `links[2].mass`.
         path: String,
-        /// The nearest key that is known.
+        /// The nearest known key.
         hint: String,
     },
-    /// A value is not what it must be.
+    /// A value is not allowed.
     #[error("{path} is {found}; it must be {expected}")]
     Wrong {
         /// JSON path, as in `links[2].mass`.
         path: String,
-        /// What is there.
+        /// What was found.
         found: String,
         /// What is allowed there.
         expected: String,
@@ -220,8 +220,8 @@ impl RobotModel {
 
     /// Reads the text of a model file. Where the text is from, `source.origin`, is left to the caller.
     ///
-    /// Returns the model and one warning for each key that means nothing here, and for each derived number
-    /// (`com_dh_frame`, `lc`) that contradicts what it is derived from; the derived numbers themselves are not used.
+    /// Returns the model and one warning for each unknown key, and for each derived number (`com_dh_frame`, `lc`) that
+    /// contradicts its source; the derived numbers themselves are not used.
     ///
     /// # Errors
     /// Names line, key, what is there and what may be.

@@ -1,4 +1,4 @@
-//! What is shown of a run as it goes, and to whom.
+//! Observers of a run in progress.
 
 use std::io;
 
@@ -8,7 +8,7 @@ use protocol::time::Instant;
 use crate::plant::Plant;
 use crate::world::{CellEvent, Mind};
 
-/// One sample as it truly was, and what the controller wanted it to be.
+/// One sample as it truly was, and as the controller intended it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
     /// The robot.
@@ -30,12 +30,12 @@ pub struct PlantState {
     pub tau: [f64; 4],
     /// Flange in frame 0: x, y, z (m), yaw (rad).
     pub tool: [f64; 4],
-    /// Whether the motor of the axis gives all the torque that it can.
+    /// Whether the motor of the axis is at its torque limit.
     pub at_limit: [bool; 4],
 }
 
 impl PlantState {
-    /// The state of a robot that has been moved on to `now`.
+    /// The state of a robot that has been advanced to `now`.
     pub fn of(plant: &Plant, now: Instant) -> Self {
         let pose = plant.pose();
         Self {
@@ -49,7 +49,7 @@ impl PlantState {
     }
 }
 
-/// What is shown of a run as it goes. An observer looks at what it cares for; a pair of observers is one.
+/// Observer of a run in progress, with a method per kind of event. A pair of observers is an observer.
 pub trait Observer {
     /// A frame was delivered.
     ///
@@ -108,12 +108,12 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     }
 }
 
-/// What slows a run down; `()` lets it go as fast as it can.
+/// Pace of a run; `()` is as fast as possible.
 pub trait Pace {
     /// Called before the sample that is due at `now` is taken.
     ///
     /// # Errors
-    /// There is nothing to wait for any more; the run ends.
+    /// There is nothing left to wait for; the run ends.
     fn sample(&mut self, now: Instant) -> io::Result<()>;
 }
 

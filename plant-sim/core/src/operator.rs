@@ -1,6 +1,6 @@
-//! The operator on the bus: works off a scenario, one request at a time, and waits for answers.
+//! The operator on the bus: executes a scenario, one request at a time, and waits for the answers.
 //!
-//! It knows the controller by its messages alone. Every wait has a limit and names what is late.
+//! It knows the controller by its messages alone. Every wait has a limit, and its error names what is late.
 
 mod program;
 
@@ -27,24 +27,24 @@ const MOVE_LIMIT: Duration = Duration::from_secs(120);
 /// Time without any frame after which the controller counts as silent: ten heartbeats.
 const SILENCE_LIMIT: Duration = Duration::from_secs(1);
 
-/// Progress of the present action.
+/// Progress of the current action.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Progress {
-    /// Not begun.
+    /// Not started.
     Due,
-    /// Sent or begun at this time.
+    /// Sent or started at this time.
     Since(Instant),
 }
 
 /// The operator of one run.
 ///
-/// Where something goes wrong it says so once, asks the controller to stop and to disable, and does no more.
+/// If something goes wrong, it reports the error once, requests stop and disable, and does no more.
 #[derive(Clone, Debug)]
 pub struct Operator {
     actions: std::vec::IntoIter<Action>,
     current: Option<Action>,
     progress: Progress,
-    /// Between two looks at what has come, and the next of them.
+    /// Polling period, and time of the next poll.
     period: Period,
     next: Instant,
     given_up: bool,
@@ -53,11 +53,11 @@ pub struct Operator {
     reply: Option<Outcome>,
     greeted: Option<Hello>,
     state: Option<State>,
-    /// The controller has reported a fault that is not cleared.
+    /// Whether the controller has reported a fault that is not cleared.
     alarmed: bool,
-    /// When the controller was heard last.
+    /// Time of the controller's last frame.
     heard: Instant,
-    /// Number of the last move that was accepted.
+    /// Sequence number of the last accepted move.
     last_move: Option<u8>,
 }
 
@@ -89,7 +89,7 @@ impl Operator {
             return;
         }
         self.heard = now;
-        // A command is nothing to an operator.
+        // Commands do not concern an operator.
         if table::COMMAND.identifies(frame) {
             return;
         }
@@ -109,11 +109,11 @@ impl Operator {
         }
     }
 
-    /// One look at what has come, and what follows from it.
+    /// One poll: evaluates what has arrived and acts on it.
     fn step(&mut self, now: Instant, world: &mut World, out: &mut Outbox) {
         match self.work(now, world, out) {
             Ok(true) => {
-                // An operator that has given up has said so.
+                // An operator that has given up has already reported it.
                 world.outcome = (!self.given_up).then_some(Ok(()));
             }
             Ok(false) => {}
@@ -135,7 +135,7 @@ impl Operator {
         self.progress = Progress::Due;
     }
 
-    /// Goes on with the present action, and with all that take no time; `true` when nothing is left to do.
+    /// Continues the current action, and all following ones that take no time; `true` when nothing is left to do.
     fn work(
         &mut self,
         now: Instant,
@@ -177,7 +177,7 @@ impl Operator {
         }
     }
 
-    /// A controller that has stopped by itself, or is no longer heard, ends the run.
+    /// Ends the run if the controller has stopped by itself or gone silent.
     fn watch(&self, now: Instant) -> Result<(), OperatorError> {
         if let Some(state) = self.state
             && matches!(state.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop)
@@ -208,11 +208,11 @@ impl Operator {
             }
             _ => return None,
         };
-        // A value that no frame can carry stays unsent; the missing reply then names the request.
+        // A value that no frame can carry is not sent; the error of the missing reply then names the request.
         self.encoder.encode(&message).ok()
     }
 
-    /// Whether the action has come to its end.
+    /// Whether the action is complete.
     fn is_complete(&mut self, action: &Action, waited: Duration) -> Result<bool, OperatorError> {
         let (complete, limit) = match action {
             Action::Hello => {
@@ -228,7 +228,7 @@ impl Operator {
             }
             Action::Request(request) => {
                 match self.reply {
-                    // What is refused because of a fault is not what went wrong: the next state says what did.
+                    // A refusal because of a fault is not the cause: the next state reports the fault.
                     Some(Outcome::Refused(_)) if self.alarmed && waited <= REPLY_LIMIT => {
                         return Ok(false);
                     }
@@ -242,7 +242,7 @@ impl Operator {
                         self.last_move = Some(self.sequence);
                     }
                     _ if *request == MotionRequest::Stop => {
-                        // What was under way will never be completed.
+                        // The current move will never complete.
                         self.last_move = None;
                     }
                     _ => {}
@@ -273,7 +273,7 @@ impl Operator {
         Ok(complete)
     }
 
-    /// What an action waits for, in words.
+    /// What an action waits for, as text.
     fn awaited(&self, action: &Action) -> String {
         match action {
             Action::Hello => "reply to hello".into(),

@@ -1,8 +1,8 @@
 //! A node on the bus of a run: drives, operator, controller, or a wrapper that makes one of them fail.
 //!
-//! Time is in the seam: a peer is called with the time, and says when each of its frames enters its transmit buffer. A
-//! wrapper can therefore delay, drop, double or shift what a node receives and sends, or babble at instants of its own,
-//! and the node knows nothing of it.
+//! The interface includes time: a peer is called with the time, and returns when each of its frames enters its transmit
+//! buffer. A wrapper can therefore delay, drop, duplicate or shift what a node receives and sends, or babble at times
+//! of its own, without the node's knowledge.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -12,20 +12,20 @@ use protocol::time::Instant;
 
 use crate::world::World;
 
-/// Frames that a call sends, each with the time at which it enters the transmit buffer: not before that of the call.
+/// Frames sent by a call, each with the time at which it enters the transmit buffer, not before that of the call.
 pub type Outbox = Vec<(Instant, CanFrame)>;
 
 /// A node on the bus of a run.
 pub trait Peer {
-    /// When it is to be called without a frame: later than it was called last, or `None` for not at all.
+    /// When to call it without a frame: later than the last call, or `None` for never.
     fn wake(&self) -> Option<Instant>;
 
-    /// Takes the frame that it has just received, or finds that the time of [`Peer::wake`] has come, and appends what it
-    /// sends to `out`. Nobody receives a frame of his own.
+    /// Takes the frame just received, or `None` at the time of [`Peer::wake`], and appends the frames it sends to
+    /// `out`. No peer receives its own frames.
     ///
     /// # Errors
-    /// It cannot take part any more, and the run has no meaning without it: a process or a board has failed, or does not do
-    /// what its twin does.
+    /// It can no longer take part, and the run is pointless without it: a process or a board has failed, or differs
+    /// from its twin.
     fn poll(
         &mut self,
         now: Instant,
@@ -35,7 +35,7 @@ pub trait Peer {
     ) -> Result<(), PeerError>;
 }
 
-/// Why a run cannot go on with a peer.
+/// Why a run cannot continue with a peer.
 #[derive(Debug, thiserror::Error)]
 #[error("the controller {who} {what}")]
 pub struct PeerError {
@@ -62,7 +62,7 @@ impl<P: Peer + ?Sized> Peer for &mut P {
     }
 }
 
-/// A peer that is looked at while it runs.
+/// A peer that is inspected while it runs.
 impl<P: Peer + ?Sized> Peer for Rc<RefCell<P>> {
     fn wake(&self) -> Option<Instant> {
         self.borrow().wake()

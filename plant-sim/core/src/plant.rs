@@ -28,7 +28,7 @@ const LIFT: usize = 2;
 
 /// The robot in motion.
 ///
-/// A new plant is at rest as after power-up: torque off, brake closed, nothing held, time 0.
+/// A new plant is at rest as after power-up: torque off, brake closed, no payload, time 0.
 #[derive(Clone, Debug)]
 pub struct Plant {
     model: RobotModel,
@@ -49,19 +49,19 @@ pub struct Plant {
     latched: (u64, Vector4<f64>),
 }
 
-/// What the drives measure, sampled by [`Plant::latch`].
+/// Measurements of the drives, sampled by [`Plant::latch`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Motor encoders.
     pub counts: [i32; 4],
-    /// Mean motor torque since the sample before, N m.
+    /// Mean motor torque since the previous sample, N m.
     pub motor_torque: [f64; 4],
 }
 
-/// Where the energy is and where it went, J.
+/// Energy balance, J.
 ///
-/// `kinetic + potential + elastic - motor_work + lost` is constant but for errors of integration and for payloads that
-/// come and go.
+/// `kinetic + potential + elastic - motor_work + lost` is constant except for integration errors and for payloads
+/// that are attached or released.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Energy {
     /// Of links, payload and rotors.
@@ -72,22 +72,22 @@ pub struct Energy {
     pub elastic: f64,
     /// Work that the motors have done since the beginning.
     pub motor_work: f64,
-    /// What friction, brake and end stops have turned into heat since the beginning.
+    /// Energy that friction, brake and end stops have dissipated since the beginning.
     pub lost: f64,
 }
 
 /// Efforts and losses at one state.
 struct Balance {
-    /// Everything that accelerates the joints.
+    /// Sum of efforts that accelerate the joints.
     effort: Vector4<f64>,
     rates: Rates,
 }
 
-/// The step (ns) that lands a loaded axis on its friction law within a few steps.
+/// Step (ns) that settles a loaded axis on its friction law within a few steps.
 ///
-/// The integrator is stable at any stiffness, but where friction builds up over less than a thirtieth of the speed that
-/// it can take away in one step, a loaded axis wobbles about its rest by a part of that speed. Friction so steep that
-/// steps of 10 us do not suffice is left to wobble by some 0.01 mm/s.
+/// The integrator is stable at any stiffness, but where friction builds up over less than a thirtieth of the speed
+/// that it can remove in one step, a loaded axis oscillates about rest with a fraction of that speed. Friction so steep
+/// that steps of 10 us do not suffice is left to oscillate by some 0.01 mm/s.
 fn resolvable_step(mass: &Matrix4<f64>, drive: &Drive) -> u64 {
     let response = integrator::factor(mass).inverse().diagonal();
     let steepest = response
@@ -97,8 +97,9 @@ fn resolvable_step(mass: &Matrix4<f64>, drive: &Drive) -> u64 {
 }
 
 impl Plant {
-    /// Longest step of integration, ns. The fastest thing it must resolve is a joint on its end stop (400 rad/s): a
-    /// fifth of a radian a step. The gate's path differs from that of 50 us steps by less than a micrometre. Only a robot with extremely steep friction gets shorter steps.
+    /// Longest step of integration, ns. The fastest motion to resolve is a joint on its end stop (400 rad/s): a
+    /// fifth of a radian per step. The gate's path differs from that of 50 us steps by less than a micrometre. Only a
+    /// robot with extremely steep friction gets shorter steps.
     pub const MAX_STEP_NS: u64 = 500_000;
 
     /// The robot of `model` at rest at joint positions `q`.
@@ -131,7 +132,7 @@ impl Plant {
         self.max_step = ns.max(1);
     }
 
-    /// Sets the joint speeds, as for a start in the middle of a motion. A lift that the brake holds stays at rest.
+    /// Sets the joint speeds, to start in the middle of a motion. A lift held by the brake stays at rest.
     pub fn set_speed(&mut self, qd: [f64; 4]) {
         self.qd = qd.into();
         if self.brake.is_sticking() {
@@ -139,10 +140,10 @@ impl Plant {
         }
     }
 
-    /// Asks the motors for torques (N m), from now on.
+    /// Commands motor torques (N m) from now on.
     ///
-    /// Returns which of them are saturated: beyond the torque limit, or beyond what is left above the speed limit. A
-    /// request that is not a number counts as zero and as saturated.
+    /// Returns which of them are saturated: beyond the torque limit, or beyond what remains above the speed limit. NaN
+    /// counts as zero and as saturated.
     pub fn set_motor_torque(&mut self, torque: [f64; 4]) -> [bool; 4] {
         self.request = Vector4::from(torque).map(|t| if t.is_nan() { 0.0 } else { t });
         let given = self
@@ -153,7 +154,7 @@ impl Plant {
         saturated
     }
 
-    /// Whether a motor was asked for more than it could give when it was last asked.
+    /// Whether the last command exceeded what a motor can give.
     pub fn is_saturated(&self) -> bool {
         self.saturated
     }
@@ -173,7 +174,7 @@ impl Plant {
         })
     }
 
-    /// Switches all motors on or off. The last request stays.
+    /// Switches all motors on or off. The last command is kept.
     pub fn set_torque_enabled(&mut self, enabled: bool) {
         self.torque_enabled = enabled;
     }
@@ -183,12 +184,12 @@ impl Plant {
         self.brake.command(engaged, self.now);
     }
 
-    /// Puts a payload into the gripper, in place of any other. It is taken over at the speed of the flange.
+    /// Puts a payload into the gripper, in place of any other, at the speed of the flange.
     pub fn attach(&mut self, payload: Payload) {
         self.hold(Some(payload));
     }
 
-    /// Lets go of the payload.
+    /// Releases the payload.
     pub fn release(&mut self) {
         self.hold(None);
     }
@@ -198,9 +199,9 @@ impl Plant {
         self.arm = Arm::new(&self.model, payload.as_ref());
     }
 
-    /// Integrates up to time `t` (ns). Earlier times do nothing.
+    /// Integrates up to time `t` (ns). An earlier time has no effect.
     ///
-    /// Steps are of fixed length; the last one, and one that ends where the brake moves, are shorter.
+    /// Steps are of fixed length, except that the last one and one ended by a change of the brake are shorter.
     pub fn advance_to(&mut self, t: u64) {
         self.brake.update(self.now);
         while self.now < t {
@@ -234,12 +235,12 @@ impl Plant {
         }
     }
 
-    /// Takes the last millimetre per second out of a gripped lift, by the impulse at the lift that does it.
+    /// Stops a gripped lift from its last millimetre per second by an impulse at the lift.
     fn stop_lift(&mut self) {
         let mass = self.total_mass(&self.arm.at(&self.q));
         let response = integrator::factor(&mass).solve(&Vector4::ith(LIFT, 1.0));
         let impulse = -self.qd[LIFT] / response[LIFT];
-        // An impulse works at the mean of the speeds before and after.
+        // The work of an impulse is at the mean of the speeds before and after.
         self.ledger[5] -= 0.5 * impulse * self.qd[LIFT];
         self.qd += response * impulse;
         self.qd[LIFT] = 0.0;
@@ -249,7 +250,7 @@ impl Plant {
         self.arm.mass_matrix(at) + self.drive.rotor_inertia()
     }
 
-    /// The mass matrix with the lift taken out while the brake holds it.
+    /// The mass matrix, without the lift while the brake holds it.
     fn constrained(&self, mut mass: Matrix4<f64>) -> Matrix4<f64> {
         if self.brake.is_sticking() {
             mass.fill_row(LIFT, 0.0);
@@ -267,7 +268,7 @@ impl Plant {
         integrator::factor(&self.constrained(self.total_mass(at))).solve(&effort)
     }
 
-    /// What a sticking brake must hold, N.
+    /// Effort on a sticking brake, N.
     fn effort_on_brake(&self, at: &Configuration) -> f64 {
         let effort = self.balance(at, &self.q, &self.qd).effort;
         let acceleration = self.acceleration(at, &effort);
@@ -337,22 +338,22 @@ impl Plant {
         self.qd.into()
     }
 
-    /// True place of the flange.
+    /// True pose of the flange.
     pub fn pose(&self) -> Pose {
         self.arm.pose(&self.arm.at(&self.q))
     }
 
-    /// Torques that the motors give now, after all limits, N m.
+    /// Present motor torques, after all limits, N m.
     pub fn motor_torque(&self) -> [f64; 4] {
         self.given_torque(&self.drive.to_motor(&self.qd)).into()
     }
 
-    /// Efforts that the motors bring to the joints now, after all limits, N m and N.
+    /// Present efforts of the motors at the joints, after all limits, N m and N.
     pub fn joint_effort(&self) -> [f64; 4] {
         self.drive.joint_effort(&self.motor_torque().into()).into()
     }
 
-    /// The account of energy.
+    /// The energy balance.
     pub fn energy(&self) -> Energy {
         let at = self.arm.at(&self.q);
         let rotors = 0.5 * self.qd.dot(&(self.drive.rotor_inertia() * self.qd));
@@ -365,7 +366,7 @@ impl Plant {
         }
     }
 
-    /// The rigid arm with what it holds.
+    /// The rigid arm with its payload.
     pub fn arm(&self) -> &Arm {
         &self.arm
     }
@@ -380,7 +381,7 @@ impl Plant {
         &self.brake
     }
 
-    /// What is held.
+    /// The payload, if any.
     pub fn payload(&self) -> Option<&Payload> {
         self.payload.as_ref()
     }

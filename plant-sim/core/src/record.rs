@@ -1,4 +1,4 @@
-//! Observers that keep a run: its trace and its truth, as text into any sink.
+//! Observers that record a run: its trace and its truth, as text into any sink.
 
 use std::io::{self, Write};
 
@@ -35,7 +35,7 @@ impl<W: Write> Observer for TraceLog<W> {
 const TRUTH_HEADER: &str = "t,q1,q2,q3,q4,qd1,qd2,qd3,qd4,rq1,rq2,rq3,rq4,rqd1,rqd2,rqd3,rqd4,\
                             tau1,tau2,tau3,tau4,x,y,z,yaw\n";
 
-/// One row a sample of what the robot did and was to do.
+/// One row per sample: actual motion of the robot and its reference.
 pub struct TruthLog<W: Write>(W);
 
 impl<W: Write> TruthLog<W> {
@@ -60,7 +60,7 @@ impl<W: Write> TruthLog<W> {
 
 impl<W: Write> Observer for TruthLog<W> {
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
-        // A third of the run's time would go into the standard library's shortest digits.
+        // The standard library's float formatting would take a third of the run's time.
         let mut digits = zmij::Buffer::new();
         self.0.write_all(digits.format(truth.plant.t).as_bytes())?;
         for group in [

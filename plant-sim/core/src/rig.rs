@@ -1,6 +1,6 @@
 //! Lock-step: peers, their bus and the robot on one time line.
 //!
-//! Time moves from event to event: a peer that wakes, a frame that enters a transmit buffer, the end of a frame on the bus. A
+//! Time advances from event to event: a peer wakes, a frame enters a transmit buffer, a frame on the bus ends. A
 //! command therefore acts as late as it would on the wire, and the same inputs give the same bytes.
 
 use std::collections::VecDeque;
@@ -27,11 +27,11 @@ use crate::world::World;
 /// Transmit mailboxes of a node: as many as an FDCAN or M_CAN has and more than it needs.
 const MAILBOXES: usize = 32;
 
-/// Longest time that a run goes on after its operator has given up, for the arm to come to rest.
+/// Longest time that a run continues after its operator has given up, for the arm to come to rest.
 pub const STANDSTILL_LIMIT: Duration = Duration::from_secs(5);
-/// Time for which the arm has to stand still.
+/// Time for which the arm has to stay at rest.
 const REST: Duration = Duration::from_millis(20);
-/// Joint speed below which an axis stands, rad/s and m/s.
+/// Joint speed below which an axis counts as at rest, rad/s and m/s.
 const STANDING: f64 = 1e-3;
 
 /// Why a run ended before its scenario.
@@ -43,7 +43,7 @@ pub enum RunError {
     /// Output failed.
     #[error("cannot write results: {0}")]
     Output(#[from] io::Error),
-    /// The run could not be held to its pace.
+    /// The pace of the run could not be kept.
     #[error("cannot keep the pace: {0}")]
     Pace(io::Error),
     /// A process or a board failed.
@@ -51,7 +51,7 @@ pub enum RunError {
     Peer(#[from] PeerError),
 }
 
-/// What a rig is made of.
+/// Configuration of a rig.
 #[derive(Clone, Debug)]
 pub struct RigConfig {
     /// The robot as it is.
@@ -62,7 +62,7 @@ pub struct RigConfig {
     pub period: Period,
     /// Joint positions at the start, rad and m.
     pub start: [f64; 4],
-    /// Bits on the bus.
+    /// Bit timing of the bus.
     pub timing: BitTiming,
 }
 
@@ -71,11 +71,11 @@ pub struct Rig<'p> {
     world: World,
     bus: BuiltinBus,
     seats: Vec<Seat<'p>>,
-    /// Node of frames that are put onto the bus from outside.
+    /// Node that sends injected frames.
     outside: NodeId,
-    /// Frames that enter the transmit buffer of their node later, by time.
+    /// Frames that will enter the transmit buffer of their node later, by time.
     pending: VecDeque<(Instant, NodeId, CanFrame)>,
-    /// What a call has sent, empty in between.
+    /// Frames sent in the current call; empty between calls.
     out: Outbox,
     period: Period,
     sample: u64,
@@ -94,7 +94,7 @@ struct Seat<'p> {
 enum Event {
     /// The oldest pending frame enters its transmit buffer.
     Enqueue(NodeId, Instant, CanFrame),
-    /// A frame is received, unless it is lost by then.
+    /// A frame is received, unless it is lost before that.
     Delivery(Option<Delivery>),
     /// This peer wakes.
     Wake(usize, Instant),
@@ -123,7 +123,8 @@ impl<'p> Rig<'p> {
         }
     }
 
-    /// Adds a peer to the bus. Peers that wake at one instant do so in the order they were added.
+    /// Adds a peer to the bus. Peers that wake at the same instant do so in the order in which they were
+    /// added.
     pub fn attach(&mut self, peer: impl Peer + 'p) {
         self.seats.push(Seat {
             peer: Box::new(peer),
@@ -136,7 +137,7 @@ impl<'p> Rig<'p> {
         self.period.sample(self.sample)
     }
 
-    /// What the bus has carried.
+    /// Statistics of the bus.
     pub fn bus(&self) -> &Statistics {
         self.bus.statistics()
     }
@@ -146,17 +147,17 @@ impl<'p> Rig<'p> {
         &self.world.plant
     }
 
-    /// How the operator's work has ended, if it has.
+    /// Outcome of the operator's scenario, once it has ended.
     pub fn outcome(&self) -> Option<&Result<(), OperatorError>> {
         self.world.outcome.as_ref()
     }
 
-    /// Frames that found a full transmit queue.
+    /// Frames dropped because of a full transmit queue.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }
 
-    /// Whether the arm stands still and its brake is closed.
+    /// Whether the arm is at rest and its brake closed.
     pub fn is_at_rest(&self) -> bool {
         let plant = &self.world.plant;
         plant.brake().is_closed() && plant.qd().iter().all(|qd| qd.abs() < STANDING)
@@ -167,12 +168,12 @@ impl<'p> Rig<'p> {
         self.enqueue(self.outside, self.now(), frame);
     }
 
-    /// Runs until the operator is done, or has given up and the arm has come to rest behind its brake, which is waited for no
-    /// longer than [`STANDSTILL_LIMIT`].
+    /// Runs until the operator is done, or has given up and the arm is at rest with its brake closed, for which it
+    /// waits no longer than [`STANDSTILL_LIMIT`].
     ///
     /// # Errors
     /// The scenario could not be completed; see [`RunError`]. Everything up to then has been
-    /// handed to `observer`.
+    /// passed to `observer`.
     pub fn run<O: Observer, P: Pace>(
         &mut self,
         pace: &mut P,
@@ -199,7 +200,7 @@ impl<'p> Rig<'p> {
         outcome.map_err(RunError::from)
     }
 
-    /// One sample: from this sampling instant up to the next.
+    /// One sample: from this sampling instant to the next.
     ///
     /// # Errors
     /// See [`Rig::run`].
@@ -232,7 +233,7 @@ impl<'p> Rig<'p> {
         }
     }
 
-    /// The earliest thing to happen before `end`. A frame that is received at that very instant belongs to the sample that ends.
+    /// The earliest event before `end`. A frame received at that very instant belongs to the ending sample.
     fn next_event(&mut self, end: Instant) -> Option<Event> {
         let pending = self.pending.front().map_or(Instant::MAX, |next| next.0);
         let valid = self.bus.next_event().unwrap_or(Instant::MAX);
@@ -240,11 +241,11 @@ impl<'p> Rig<'p> {
             .seats
             .iter()
             .enumerate()
-            // One that has started again asks for a time that is over.
+            // A restarted peer may wake at a time that has passed.
             .filter_map(|(index, seat)| Some((seat.peer.wake()?.max(self.last), index)))
             .min()
             .unwrap_or((Instant::MAX, 0));
-        // What enters the bus at the instant a frame ends may still win the next arbitration.
+        // Frames queued at the instant another one ends may still win the next arbitration.
         if pending < end && pending <= valid && pending <= wake {
             let (time, node, frame) = self.pending.pop_front()?;
             self.last = time;
@@ -296,7 +297,7 @@ impl<'p> Rig<'p> {
 }
 
 impl RigConfig {
-    /// What the controller of this rig is configured with.
+    /// Configuration of this rig's controller.
     pub fn controller(&self) -> Config {
         let mut config = Config::new(self.nominal, self.period);
         config.setup.command_delay = command_delay(&self.timing).seconds() as f32;
@@ -305,7 +306,7 @@ impl RigConfig {
 }
 
 /// Time from a sample until its command acts: two frames and the computing time, on an
-/// otherwise idle bus with about half of the stuff bits there can be.
+/// otherwise idle bus with about half of the possible stuff bits.
 fn command_delay(timing: &BitTiming) -> Duration {
     let frame = |info| timing.duration(FrameBits::exact(&specimen(info)));
     frame(&table::FEEDBACK) + COMPUTE + frame(&table::COMMAND)
@@ -319,7 +320,7 @@ fn specimen(info: &MessageInfo) -> CanFrame {
 /// Worst-case load of the bus at a control rate.
 ///
 /// # Errors
-/// [`Overload`] with the number where it is more than a bus may carry.
+/// [`Overload`] if it is more than allowed.
 pub fn admit(timing: &BitTiming, rate_hz: f64) -> Result<f64, Overload> {
     let traffic: Vec<Traffic> = table::TABLE
         .iter()
@@ -344,7 +345,7 @@ mod tests {
 
     use super::*;
 
-    /// A controller that nobody configures for its bus assumes the default one.
+    /// A controller that is not configured for its bus assumes the default timing.
     #[test]
     fn the_controllers_own_delay_is_that_of_the_default_bus() {
         let delay = command_delay(&BitTiming::default());

@@ -1,4 +1,4 @@
-//! One run, from configuration to summary, with no file, clock or print: what is kept of it is the observer's business.
+//! One run, from configuration to summary, without file, clock or print: recording it is up to the observer.
 
 use std::io;
 
@@ -13,7 +13,7 @@ use crate::rig::{Rig, RunError};
 use crate::setup::{RunConfig, SetupError};
 use crate::summary::{Collector, Summary};
 
-/// Why there is no summary.
+/// Why a run has no summary.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// The run cannot begin.
@@ -22,7 +22,7 @@ pub enum Failure {
     /// The controller could not be started.
     #[error(transparent)]
     Controller(#[from] PeerError),
-    /// An observer could not keep what it was shown.
+    /// An observer could not record the run.
     #[error("cannot write results: {0}")]
     Output(io::Error),
 }
@@ -42,7 +42,7 @@ pub fn in_process<O: Observer>(config: &RunConfig, observer: &mut O) -> Result<S
     )
 }
 
-/// Runs a scenario with the controller that `connect` starts, as fast as `pace` lets it.
+/// Runs a scenario with the controller that `connect` starts, at the pace of `pace`.
 ///
 /// # Errors
 /// See [`Failure`].

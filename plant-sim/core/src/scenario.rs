@@ -1,4 +1,4 @@
-//! What to run: start, payload, law, and the steps of a cycle. A TOML text, or one by name.
+//! Scenarios: start, payload, law, and the steps of a cycle, as TOML text or by name.
 
 mod check;
 
@@ -30,32 +30,32 @@ const BUILT_IN: [(&str, &str); 4] = [
 pub struct Scenario {
     /// Name, for the summary.
     pub name: String,
-    /// How often the cycle is repeated.
+    /// Number of cycles.
     pub cycles: u32,
     /// Control rate, Hz.
     pub rate_hz: f64,
     /// Control law and compensation, such as `computed-torque:observer`.
     pub law: LawChoice,
-    /// Gains, where not the controller's own.
+    /// Gains; otherwise the controller's defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainsSpec>,
-    /// Tool pose at the start: x, y, z, yaw. The elbow is at the positive side.
+    /// Tool pose at the start: x, y, z, yaw. The elbow bends to the positive side.
     #[serde(deserialize_with = "exactly")]
     pub start: [f64; 4],
-    /// What the flange carries from the start.
+    /// Payload at the flange from the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub payload: Option<PayloadSpec>,
-    /// How the true robot differs from what the controller believes.
+    /// How the actual robot differs from the nominal one.
     #[serde(default)]
     pub mismatch: Mismatch,
     /// Steps of one cycle.
     pub cycle: Vec<Step>,
-    /// The text that all this was read from; messages find their place in it.
+    /// The text that this was read from, for places in messages.
     #[serde(skip)]
     pub source: Source,
 }
 
-/// An array of exactly so many numbers: serde alone ignores surplus elements.
+/// An array of exactly `N` numbers: serde alone ignores surplus elements.
 fn exactly<'de, D: Deserializer<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<[f64; N], D::Error> {
@@ -95,8 +95,8 @@ pub struct PayloadSpec {
 }
 
 impl PayloadSpec {
-    /// A compact body of `mass` kg: centre of mass 50 mm below the flange, radius of gyration as
-    /// that of the 2 kg benchmark payload.
+    /// A compact body of `mass` kg: centre of mass 50 mm below the flange, radius of gyration
+    /// as for the 2 kg benchmark payload.
     pub fn compact(mass: f64) -> Self {
         Self {
             mass,
@@ -125,7 +125,7 @@ impl From<PayloadSpec> for Payload {
     }
 }
 
-/// True value over the value that the controller believes.
+/// Mismatch: actual value over nominal value.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mismatch {
@@ -160,7 +160,7 @@ pub enum Step {
     Stop(f64),
     /// Take a payload and announce it.
     Pick(PayloadSpec),
-    /// Let go of the payload and announce it.
+    /// Release the payload and announce it.
     Place {},
 }
 
@@ -171,9 +171,9 @@ pub struct Jump {
     /// Flange at the end: x, y, z (m) and yaw (rad) in frame 0.
     #[serde(deserialize_with = "exactly")]
     pub to: [f64; 4],
-    /// z of the flange on its way across, m in frame 0: a height of the cell, not above start or end.
+    /// z of the flange on its way across, m in frame 0: absolute, not relative to start or end.
     pub top: f64,
-    /// Length of the strictly vertical part at each end, m upwards from where the flange is there.
+    /// Length of the strictly vertical part at each end, m upwards from the flange at that end.
     pub clearance: f64,
     /// Share of full speed.
     #[serde(default = "full")]
@@ -196,7 +196,7 @@ fn full() -> f64 {
     1.0
 }
 
-/// Why there is no scenario.
+/// Why a scenario was refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
     /// The text is not a scenario; the message names line and key.
@@ -207,7 +207,7 @@ pub enum ScenarioError {
         /// What is wrong and where.
         message: String,
     },
-    /// A value makes no sense.
+    /// A value is not allowed.
     #[error("scenario {origin}: {}{key} is {value}; allowed: {allowed}", at(*place))]
     Value {
         /// File or name.
@@ -216,9 +216,9 @@ pub enum ScenarioError {
         place: Option<(usize, usize)>,
         /// Key, as in `cycle[2].jump.top`.
         key: String,
-        /// What it is.
+        /// The value.
         value: String,
-        /// What it may be.
+        /// What is allowed.
         allowed: String,
     },
 }
@@ -266,8 +266,8 @@ impl Scenario {
         toml::to_string(self).expect("numbers and texts can be written")
     }
 
-    /// The payload of `kg` that a person asks for by weight alone: the scenario's own body, as much denser or lighter, or a
-    /// compact one; none for 0 kg.
+    /// The payload for a mass of `kg` alone: the scenario's own body, scaled in density, or a compact one; none for 0
+    /// kg.
     pub fn payload_of(&self, kg: f64) -> Option<PayloadSpec> {
         if kg == 0.0 {
             return None;
@@ -279,7 +279,7 @@ impl Scenario {
     }
 }
 
-/// The message about an unknown key lists all that are known; the nearest is most likely the one that was meant.
+/// Adds the nearest known key to the message about an unknown one: most likely the one that was meant.
 fn with_nearest(message: &str) -> String {
     let between_ticks: Vec<&str> = message
         .rsplit_once("unknown field ")
@@ -300,7 +300,7 @@ fn with_nearest(message: &str) -> String {
 /// Most cycles of a run.
 pub const MAX_CYCLES: u32 = 1_000_000;
 
-/// Whether a control rate can be simulated.
+/// Checks that a control rate can be simulated.
 ///
 /// # Errors
 /// What is allowed.

@@ -1,4 +1,4 @@
-//! Names of control laws as people write them: `LAW` or `LAW:COMPENSATION`.
+//! Names of control laws: `LAW` or `LAW:COMPENSATION`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 use protocol::messages::{Compensation, Law};
 use serde::{Deserialize, Serialize, Serializer};
 
-/// A control law and what helps it against friction and payload error.
+/// A control law and its compensation of friction and payload error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 pub struct LawChoice {
@@ -25,7 +25,7 @@ pub enum LawError {
     /// No such compensation.
     #[error("no compensation '{0}'; allowed: none, integral, observer")]
     Compensation(String),
-    /// Only the computed-torque laws take one.
+    /// A compensation for a law that takes none.
     #[error("{0} takes no compensation; only computed-torque and computed-torque-task do")]
     NotTaken(Law),
 }

@@ -1,4 +1,4 @@
-//! From a scenario and two robots to a rig: what is to run with what, checked.
+//! Checked setup of a run: from a scenario and two robots to a rig.
 
 use firmware::mechanics::arm::{self, ArmModel};
 use protocol::time::Period;
@@ -11,7 +11,7 @@ use crate::plant::kinematics::{Pose, inverse};
 use crate::rig::{self, RigConfig};
 use crate::scenario::{Scenario, ScenarioError, Step};
 
-/// What to run with what.
+/// Configuration of a run.
 #[derive(Clone, Debug)]
 pub struct RunConfig {
     /// Motion, law, payload, mismatch.
@@ -25,7 +25,7 @@ pub struct RunConfig {
 /// Why a run cannot begin.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
-    /// The scenario asks for what this robot cannot do.
+    /// The robot cannot do what the scenario requires.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The start of the scenario is outside the robot's workspace.
@@ -46,7 +46,7 @@ pub enum SetupError {
         /// Pose.
         yaw: f64,
     },
-    /// The controller cannot work with the model.
+    /// The controller cannot use the model.
     #[error("model {robot}: {source}")]
     Model {
         /// Robot.
@@ -65,7 +65,7 @@ pub enum SetupError {
 }
 
 impl RunConfig {
-    /// This scenario with the default robot, known as it is.
+    /// This scenario with the default robot, without mismatch of the model.
     pub fn new(scenario: Scenario) -> Self {
         Self {
             scenario,
@@ -74,10 +74,10 @@ impl RunConfig {
         }
     }
 
-    /// The rig that the run needs.
+    /// The rig for the run.
     ///
     /// # Errors
-    /// The robot cannot start there, the controller not work with it, or the bus not carry the messages.
+    /// The robot cannot reach the start, the controller cannot use the model, or the bus cannot carry the messages.
     pub fn rig(&self) -> Result<RigConfig, SetupError> {
         let scenario = &self.scenario;
         scenario.check_with(&self.nominal)?;
@@ -105,7 +105,7 @@ impl RunConfig {
         Ok(rig)
     }
 
-    /// Where the tool is to be when a cycle has ended: x, y, z (m) and yaw (rad) in frame 0; none after a stop on the path.
+    /// Target of the tool at the end of a cycle: x, y, z (m) and yaw (rad) in frame 0; none after a stop on the path.
     pub fn cycle_target(&self) -> Option<[f64; 4]> {
         let mut target = Some(self.scenario.start);
         for step in &self.scenario.cycle {

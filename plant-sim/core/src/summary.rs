@@ -1,4 +1,4 @@
-//! What a run is judged by, gathered while it goes.
+//! Summary of a run, gathered while it runs.
 
 mod recipe;
 
@@ -28,19 +28,19 @@ pub struct Summary {
     pub recipe: Recipe,
     /// Cycles completed.
     pub cycles: u32,
-    /// Cycles that the scenario asks for.
+    /// Cycles of the scenario.
     pub cycles_asked: u32,
-    /// Completed cycles in which nothing moved. They have no times, and none below counts them.
+    /// Completed cycles in which nothing moved. They have no times, and no number below includes them.
     pub cycles_still: u32,
     /// Whether the scenario ran to its end.
     pub completed: bool,
     /// Why not.
     pub error: Option<String>,
-    /// State of the controller in the end, as it reported it; `null` if it never did.
+    /// Final state of the controller, as reported; `null` if never.
     pub state: Option<&'static str>,
-    /// Fault that is latched in the end.
+    /// Fault latched at the end.
     pub fault: Option<String>,
-    /// Whether the arm stood still behind its closed brake in the end.
+    /// Whether the arm ended at rest with its brake closed.
     pub at_rest: bool,
     /// From the start of motion until the tool is back within 1 mm and 10 mrad and stays.
     pub cycle_time_s: Option<Spread>,
@@ -52,7 +52,7 @@ pub struct Summary {
     pub tracking_error_mrad: RmsMax,
     /// Distance from the target at the end of a dwell.
     pub final_error_mm: FinalError,
-    /// Yaw away from the target at the end of a dwell.
+    /// Yaw error from the target at the end of a dwell.
     pub final_error_mrad: FinalError,
     /// Peak effort over its limit.
     pub torque_utilisation: [f64; 4],
@@ -60,15 +60,15 @@ pub struct Summary {
     pub thermal_utilisation: [f64; 4],
     /// Peak speed over its limit.
     pub speed_utilisation: [f64; 4],
-    /// Longest time for which the motor gave all it can, by axis, as the plant saw it.
+    /// Longest time with the motor at its limit, by axis, according to the plant.
     pub longest_saturation_s: [f64; 4],
-    /// Share of the time that the bus was taken.
+    /// Share of the time for which the bus was busy.
     pub bus_load: f64,
     /// Frames delivered.
     pub frames: u64,
-    /// Samples whose command had not come when the next sample was taken.
+    /// Samples without a command by the time of the next sample.
     pub overruns: u64,
-    /// Frames that a full transmit queue or an identifier collision lost.
+    /// Frames lost to a full transmit queue or an identifier collision.
     pub frames_lost: u64,
     /// Faults that the controller reported.
     pub faults: Vec<Fault>,
@@ -81,7 +81,7 @@ pub struct Summary {
 /// Greatest offset from the target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FinalError {
-    /// mm or mrad; `null` where no cycle was completed that has a target.
+    /// mm or mrad; `null` if no cycle with a target was completed.
     pub max: Option<f64>,
 }
 
@@ -98,13 +98,13 @@ pub struct Fault {
     pub description: &'static str,
     /// Axis, if one is concerned.
     pub axis: Option<&'static str>,
-    /// What was found; 0 if that is not a number.
+    /// Value found; 0 if the fault has no number.
     pub value: f32,
-    /// What is allowed; 0 if that is not a number.
+    /// Limit; 0 if the fault has none.
     pub limit: f32,
     /// Unit of value and limit.
     pub unit: &'static str,
-    /// All of it as a person reads it.
+    /// All of it as text.
     pub text: String,
 }
 
@@ -124,10 +124,10 @@ pub struct Collector {
     faults: Vec<Fault>,
     /// The last state.
     state: Option<State>,
-    /// An emergency has come, and no state since.
+    /// Whether an emergency has arrived and no state since.
     awaits_state: bool,
     target: Option<[f64; 4]>,
-    /// Whether a command has come since the last sample; `None` before the first of all.
+    /// Whether a command has arrived since the last sample; `None` before the very first.
     answered: Option<bool>,
     overruns: u64,
 }
@@ -146,7 +146,7 @@ impl Collector {
         }
     }
 
-    /// What the run came to; `result` says how it ended.
+    /// The summary; `result` is how the run ended.
     pub fn finish(
         self,
         config: &RunConfig,
@@ -234,7 +234,7 @@ impl Observer for Collector {
                 self.faults.push(fault);
                 self.awaits_state = true;
             }
-            // What had no room in the emergency follows at once, unless a state of before is still under way.
+            // The state with the rest of the fault follows at once, unless an earlier state is still on the bus.
             Message::State(state) => {
                 self.state = Some(state);
                 if self.awaits_state

@@ -1,6 +1,6 @@
-//! Text that a person wrote: where it is from, and places and words in it for messages about them.
+//! Input text: its origin, and places and words in it for messages.
 
-/// Where a scenario or a model comes from.
+/// Text of a scenario or a model, and its origin.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Source {
     /// File, or the name of one that comes with the program.
@@ -17,7 +17,7 @@ pub(crate) fn place(text: &str, at: usize) -> (usize, usize) {
     (line, before[start..].chars().count() + 1)
 }
 
-/// The word that was most likely meant, if one is near enough.
+/// The known word most likely meant, if one is near enough.
 pub(crate) fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     known
         .map(|known| (strsim::jaro_winkler(word, known), known))

@@ -1,4 +1,4 @@
-//! What the peers of a run share besides the bus.
+//! State that the peers of a run share besides the bus.
 
 use firmware::node::Node;
 use protocol::messages::{Fault, Mode, Refusal};
@@ -7,19 +7,20 @@ use protocol::time::{Duration, Instant};
 use crate::model::Payload;
 use crate::plant::Plant;
 
-/// What peers share besides the bus: the robot between drives and operator, and what each lets the run know.
+/// State that peers share besides the bus: the robot, used by drives and operator, and what each peer reports to the
+/// run.
 pub struct World {
-    /// The robot. It stands still until somebody moves it on to the present.
+    /// The robot, as of the last time somebody advanced it.
     pub plant: Plant,
-    /// What the controller has in mind.
+    /// The controller's intention.
     pub mind: Mind,
-    /// What happened in the cell in this call.
+    /// Events in the cell during this call.
     pub cell_events: Vec<CellEvent>,
-    /// How the operator's work has ended.
+    /// Outcome of the operator's scenario, once it has ended.
     pub outcome: Option<Result<(), OperatorError>>,
 }
 
-/// What a controller has in mind when it has answered a sample.
+/// A controller's intention after answering a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mind {
     /// Reference: joint positions, rad and m.
@@ -38,7 +39,7 @@ impl Mind {
         mode: Mode::Boot,
     };
 
-    /// What this node has in mind.
+    /// The intention of this node.
     pub fn of(node: &Node) -> Self {
         let controller = node.controller();
         let four = |v: &nalgebra::Vector4<f32>| [v.x, v.y, v.z, v.w].map(f64::from);
@@ -50,7 +51,7 @@ impl Mind {
     }
 }
 
-/// What happens in the cell beside the bus: the gripper takes or drops a payload, a cycle begins or ends.
+/// Events in the cell apart from the bus: the gripper takes or releases a payload, a cycle begins or ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CellEvent {
     /// Put this into the gripper.
@@ -69,33 +70,33 @@ pub enum OperatorError {
     /// The controller refused a request.
     #[error("{request} refused: {}", sentence(refusal))]
     Refused {
-        /// Which.
+        /// Name of the request.
         request: &'static str,
         /// Why.
         refusal: Refusal,
     },
-    /// Nothing came in time.
-    #[error("the controller is late: {what} did not come within {:.1} s", limit.seconds())]
+    /// Something expected did not arrive in time.
+    #[error("the controller is late: no {what} within {:.1} s", limit.seconds())]
     Late {
-        /// What was waited for.
+        /// What was expected.
         what: String,
-        /// For how long.
+        /// Longest wait.
         limit: Duration,
     },
-    /// Nothing comes any more.
-    #[error("the controller is silent since {:.3} s", since.seconds())]
+    /// The controller sends nothing any more.
+    #[error("the controller has been silent since {:.3} s", since.seconds())]
     Silent {
-        /// When it was heard last.
+        /// Time of its last frame.
         since: Instant,
     },
     /// The peers were built from different message tables.
     #[error(
-        "the controller speaks schema {theirs:08x}, this program {ours:08x}; build both from one source"
+        "the controller uses schema {theirs:08x}, this program {ours:08x}; build both from the same source"
     )]
     Schema {
-        /// Controller's.
+        /// Schema hash of the controller.
         theirs: u32,
-        /// Ours.
+        /// Schema hash of this program.
         ours: u32,
     },
     /// The controller stopped.

@@ -1,4 +1,4 @@
-//! The bus as a discrete-event system: who wins, when, and that the books add up.
+//! The bus as a discrete-event system: which frame wins, when, and that the statistics add up.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -11,8 +11,8 @@ use protocol::{
 };
 use sim::bus::{BuiltinBus, Delivery, MAX_LOAD, NodeId, Traffic, admit, worst_case_load};
 
-/// From valid for receivers to the end of the intermission at 1 Mbit/s, sample point 80 %: the rest of the last but one
-/// bit of end of frame, its last bit, three bits of intermission.
+/// From the frame being valid to the end of the intermission at 1 Mbit/s, sample point 80 %: the rest of the last but
+/// one bit of end of frame, its last bit, three bits of intermission.
 const AFTER_VALID: Duration = Duration::from_nanos(200 + 1000 + 3000);
 
 fn standard(id: u16) -> Id {
@@ -113,7 +113,7 @@ fn a_frame_put_in_at_the_instant_of_a_start_takes_part() {
     bus.enqueue(nodes[1], ns(7), &high).unwrap();
     assert_eq!(bus.pop_delivery(Instant::MAX).unwrap().frame, high);
 
-    // The end of the intermission is such an instant too.
+    // The end of the intermission is also such an instant.
     let again = ns(7) + duration(&high);
     bus.enqueue(nodes[1], again, &high).unwrap();
     assert_eq!(bus.pop_delivery(Instant::MAX).unwrap().frame, high);
@@ -158,11 +158,11 @@ fn one_identifier_from_two_nodes_is_reported_and_both_frames_are_lost() {
         collision.nodes.iter().collect::<Vec<_>>(),
         [nodes[0], nodes[2]]
     );
-    // The bus was taken at least for the shortest such frame up to its CRC, before the bystander could start.
+    // The bus was busy at least for the shortest such frame up to its CRC, before the bystander could start.
     assert!(delivered[0].start > ns(34_000));
 }
 
-/// FDF stands behind the arbitration field: a classical and an FD frame of one identifier are no better.
+/// FDF follows the arbitration field, so a classical and an FD frame of one identifier collide too.
 #[test]
 fn a_classical_and_an_fd_frame_of_one_identifier_collide() {
     let (mut bus, nodes) = bus_of(2);
@@ -212,7 +212,7 @@ fn a_link_profile_is_refused_above_80_percent_with_the_number() {
     );
     assert!(admit(&timing, &profile(f64::NAN)).is_err());
 
-    // Known for this bench's pair at 1 kHz: 24 B in 89 us and 48 B in 137 us at worst.
+    // Known for this pair at 1 kHz: 24 B in 89 us and 48 B in 137 us at worst.
     let pair = [24, 48].map(|len| Traffic {
         frame: CanFrame::fd(standard(0x240), &vec![0; len], true).unwrap(),
         rate: 1000.0,
@@ -221,8 +221,8 @@ fn a_link_profile_is_refused_above_80_percent_with_the_number() {
     assert!((load - 0.226).abs() < 0.001 && load < MAX_LOAD);
 }
 
-/// One frame of random traffic: node, gap since the one before, frame. Every node has its own identifiers, so nothing
-/// collides; gaps from none to longer than a frame mix contention with an idle bus.
+/// One frame of random traffic: node, gap since the previous one, frame. Every node has its own identifiers, so nothing
+/// collides; gaps between zero and more than a frame mix contention with an idle bus.
 fn any_traffic() -> impl Strategy<Value = Vec<(usize, u64, CanFrame)>> {
     let item = (
         0_usize..4,
@@ -300,7 +300,7 @@ proptest! {
         let queued = queued_at(&traffic);
         for (at, winner) in delivered.iter().enumerate() {
             for loser in &delivered[at + 1..] {
-                // `Ord` of identifiers is that of arbitration. Equal ones were put in earlier by the same node.
+                // `Ord` of identifiers is the order of arbitration. Equal ones were queued earlier by the same node.
                 if queued[&loser.frame] <= winner.start {
                     prop_assert!(winner.frame.id() <= loser.frame.id());
                 }
@@ -312,7 +312,7 @@ proptest! {
         }
     }
 
-    /// Work-conserving: a frame starts when it was put in, or when the bus is free again; never earlier, never later.
+    /// Work-conserving: a frame starts when it is queued or when the bus is free again; never earlier, never later.
     #[test]
     fn the_bus_is_never_idle_while_a_frame_waits(traffic in any_traffic()) {
         let (delivered, _) = run(&traffic, true);
@@ -349,7 +349,7 @@ proptest! {
         prop_assert!(statistics.total.load(end.since(ns(0))) <= 1.0);
     }
 
-    /// When the caller looks changes nothing, and the same traffic gives the same run.
+    /// The times of the caller's polling change nothing, and the same traffic gives the same run.
     #[test]
     fn the_run_does_not_depend_on_when_deliveries_are_taken(traffic in any_traffic()) {
         let (eager, bus) = run(&traffic, true);

@@ -72,7 +72,7 @@ impl Wire {
     }
 
     /// CRC field of an FD frame: stuff count (Gray code, parity), CRC over all bits sent so far and the stuff count,
-    /// a fixed stuff bit, complement of the bit in front of it, before the first and after every fourth bit.
+    /// a fixed stuff bit, complement of the bit before it, before the first and after every fourth bit.
     fn check_field(stuffed: &[(bool, bool)], inserted: usize, len: usize) -> Vec<bool> {
         let count = (inserted % 8) as u64;
         let gray = count ^ count >> 1;
@@ -92,7 +92,7 @@ impl Wire {
             out.extend(chunk);
             last = chunk[chunk.len() - 1];
         }
-        // A last chunk of four is followed by a fixed stuff bit as well; neither 4 + 17 nor 4 + 21 bits end so.
+        // A last chunk of four would be followed by a fixed stuff bit too; neither 4 + 17 nor 4 + 21 bits end with one.
         assert_ne!(field.len() % 4, 0);
         out
     }
@@ -111,11 +111,11 @@ fn number(value: u64, width: u32) -> impl Iterator<Item = bool> {
     (0..width).rev().map(move |bit| value >> bit & 1 == 1)
 }
 
-/// Long division of the message by the polynomial, as written on paper: message bits, then `width` zeros.
+/// Long division of the message by the polynomial, as by hand: message bits, then `width` zeros.
 fn crc(width: u32, polynomial: u64, start: u64, message: &[bool]) -> u64 {
     let divisor = 1 << width | polynomial;
     let padded = message.iter().copied().chain((0..width).map(|_| false));
-    // A start value is the message's first bits inverted where it has ones.
+    // A start value inverts the message's first bits where it has ones.
     let padded = padded.enumerate().map(|(at, bit)| {
         bit ^ (at < width as usize && start >> (width as usize - 1 - at) & 1 == 1)
     });
@@ -129,8 +129,7 @@ fn crc(width: u32, polynomial: u64, start: u64, message: &[bool]) -> u64 {
     })
 }
 
-/// Looks back over what was sent: five equal bits are followed by their complement; `behind_last` says whether also at
-/// the very end.
+/// Looks back over the bits sent: five equal bits are followed by their complement; `behind_last` also at the very end.
 fn stuff(bits: &[(bool, bool)], behind_last: bool) -> Vec<(bool, bool)> {
     let mut out: Vec<(bool, bool)> = Vec::new();
     for (at, &(bit, data)) in bits.iter().enumerate() {
@@ -159,7 +158,7 @@ fn any_id() -> impl Strategy<Value = Id> {
     ]
 }
 
-/// Random bytes, and such with long runs of equal bits.
+/// Random bytes, and bytes with long runs of equal bits.
 fn any_data(max: usize) -> impl Strategy<Value = Vec<u8>> {
     let byte = prop_oneof![
         any::<u8>(),
@@ -186,7 +185,7 @@ fn any_frame() -> impl Strategy<Value = CanFrame> {
 }
 
 /// Check values of the catalogue of parametrised CRC algorithms: the second derivation computes the right CRCs. (The
-/// catalogue has the start value 0 of the first FD specification; ISO 11898-1:2015 starts with a one in front.)
+/// catalogue has the start value 0 of the first FD specification; ISO 11898-1:2015 starts with a leading one.)
 #[test]
 fn crcs_of_the_second_derivation_have_the_published_check_values() {
     let digits: Vec<bool> = b"123456789"
@@ -268,7 +267,7 @@ fn fd_durations_are_the_known_ones() {
 /// Five equal bits at the very end: the first fixed stuff bit takes the place of the dynamic one.
 #[test]
 fn a_run_that_ends_with_the_data_field_adds_no_bit_to_an_fd_frame() {
-    // Identifier, ESI 0 and DLC 0001 hold no run of five.
+    // Identifier, ESI 0 and DLC 0001 contain no run of five.
     let bits = |byte| FrameBits::exact(&CanFrame::fd(standard(0x555), &[byte], true).unwrap());
     let no_run = bits(0b1010_1010);
     assert_eq!(bits(0b1010_0000), no_run);
@@ -282,7 +281,7 @@ fn without_bit_rate_switch_all_bits_are_nominal() {
     let slow = FrameBits::exact(&CanFrame::fd(standard(0x2C0), &data, false).unwrap());
     let fast = FrameBits::exact(&CanFrame::fd(standard(0x2C0), &data, true).unwrap());
     assert_eq!(slow.data, 0);
-    // Between FDF 1 and DLC 1111 stand res 0, BRS, ESI 0: whichever value BRS has, no run of five.
+    // Between FDF 1 and DLC 1111 are res 0, BRS and ESI 0: no run of five for either value of BRS.
     assert_eq!(slow.nominal, fast.nominal + fast.data);
 }
 
@@ -306,7 +305,7 @@ fn bit_timing_refuses_what_no_controller_has() {
     );
 }
 
-/// 3 Mbit/s has no whole number of ns a bit: never shorter than the truth, and less than 1 ns longer a phase.
+/// 3 Mbit/s has no whole number of ns per bit: never shorter than exact, and less than 1 ns longer per phase.
 #[test]
 fn durations_round_up_to_a_whole_ns() {
     let timing = BitTiming::new(1_000_000, 3_000_000, 800).unwrap();

@@ -1,4 +1,4 @@
-//! Parameters of the drives, asked as the controller asks, and the whole way from an operator and back.
+//! Parameters of the drives, requested like the controller does, and the round trip from an operator.
 
 use protocol::codec::{decode, encode};
 use protocol::frame::CanFrame;
@@ -51,7 +51,7 @@ impl Bench {
             sample: 0,
             counters: [0; 2],
         };
-        // The first request must not change anything, so that it is no set.
+        // The first request must not change anything, so it is not a set.
         bench.ask(ParameterRequest::List { from: 0 });
         bench
     }
@@ -152,7 +152,7 @@ fn every_reply_occurs() {
         ParameterReply::Value { value: 7.0, .. }
     ));
     assert_eq!(bench.get(TORQUE), 0.5);
-    // Drives that start again, and a first frame that may be a recording.
+    // Drives that restart, and a first frame that may be a replay.
     bench.drives = Drives::new(&bench.model, PERIOD);
     assert_eq!(error(bench.set(HOLD, 9.0)), (ParameterError::NotNow, 0.0));
     assert_eq!(bench.get(HOLD), 5.0);
@@ -173,7 +173,7 @@ fn a_torque_limit_cuts_the_next_command() {
     assert!(!bench.sample().contains(DriveStatus::TORQUE_SATURATED));
 }
 
-/// Samples without a command until the drives let go.
+/// Samples without a command until the drives switch torque off.
 #[test]
 fn commands_are_held_for_as_long_as_is_set() {
     for (set, held) in [(None, 5), (Some(1.0), 1), (Some(20.0), 20)] {
@@ -189,7 +189,7 @@ fn commands_are_held_for_as_long_as_is_set() {
     }
 }
 
-/// Torque must not go before the brake has closed, whatever an operator sets.
+/// Torque must not go off before the brake has closed, whatever an operator sets.
 #[test]
 fn no_brake_delay_is_shorter_than_the_brake() {
     let shortest = f64::from(ControllerParameter::BrakeDelay.rule().lower);
@@ -197,7 +197,7 @@ fn no_brake_delay_is_shorter_than_the_brake() {
     assert!((shortest * 1e9).round() >= needed as f64);
 }
 
-/// Keeps the answers that the operator gets.
+/// Records the answers to the operator.
 #[derive(Default)]
 struct Answers(Vec<ParameterReply>);
 
@@ -212,7 +212,7 @@ impl Observer for Answers {
     }
 }
 
-/// Through the bus, the controller, the bus, the drives and back: in the middle of a run, which it does not disturb.
+/// Through bus, controller, bus and drives and back, in the middle of a run, without disturbing it.
 #[test]
 fn an_operator_reads_and_sets_what_the_drives_have() {
     let config = RunConfig::new(Scenario::built_in("gate").unwrap());
@@ -227,7 +227,7 @@ fn an_operator_reads_and_sets_what_the_drives_have() {
     }
     answers.0.clear();
     let index = HOLD.rule().number;
-    // The operator has said hello with number 0.
+    // The operator has sent its Hello with counter 0.
     let requests = [
         ParameterRequest::Set { index, value: 9.0 },
         ParameterRequest::Get { index },
@@ -242,7 +242,7 @@ fn an_operator_reads_and_sets_what_the_drives_have() {
             bench.step(&mut (), &mut answers).unwrap();
         }
     }
-    // The first request that the drives ever hear changes nothing.
+    // The first request that the drives receive changes nothing.
     assert!(matches!(
         answers.0[..],
         [

@@ -1,4 +1,4 @@
-//! Peers that fail, as wrappers of those that do not, and what a run makes of them.
+//! Failing peers, as wrappers of working ones, and how a run ends with them.
 
 use protocol::codec;
 use protocol::frame::CanFrame;
@@ -50,7 +50,7 @@ impl<P: Peer, F: FnMut(Instant, CanFrame, &mut Outbox)> Peer for Faulty<P, F> {
     }
 }
 
-/// A node that talks whenever its time has come, and never listens.
+/// A node that sends at its own times and never listens.
 struct Babbler {
     frame: CanFrame,
     next: Instant,
@@ -105,7 +105,7 @@ impl Seen {
     }
 }
 
-/// Every tenth command is lost: the drives hold the torque of the last one, and the gate is still done.
+/// Every tenth command is lost: the drives hold the last torque, and the gate still completes.
 #[test]
 fn a_wrapper_drops_frames() {
     let mut seen = Seen::default();
@@ -134,7 +134,7 @@ fn a_wrapper_drops_frames() {
     assert_eq!(summary.overruns, feedback as u64 / 10);
 }
 
-/// Feedback that comes 300 us late is answered 300 us late, and one that comes twice is not answered twice.
+/// Feedback 300 us late is answered 300 us late, and duplicate feedback is not answered twice.
 #[test]
 fn a_wrapper_delays_and_doubles_frames() {
     let late = Duration::from_micros(300);
@@ -165,7 +165,7 @@ fn a_wrapper_delays_and_doubles_frames() {
             .unwrap()
             .0
     };
-    // The first words of the controller are in the way of the first feedback, but not of the late one.
+    // The controller's first frames delay the first feedback, but not the late one.
     assert_eq!(good.count(&table::COMMAND), 50);
     assert_eq!(delayed.count(&table::COMMAND), 50);
     assert!(first(&delayed) > first(&good));
@@ -174,7 +174,7 @@ fn a_wrapper_delays_and_doubles_frames() {
     assert_eq!(doubled.count(&table::COMMAND), 50);
 }
 
-/// A node that repeats an emergency stop stops the run, which ends at rest and says why.
+/// A node that repeats an emergency stop stops the run, which ends at rest and reports why.
 #[test]
 fn a_babbler_is_one_more_peer() {
     let config = gate();
@@ -214,12 +214,12 @@ fn a_babbler_is_one_more_peer() {
         .collect();
     assert!(stops.len() > 10);
     for pair in stops.windows(2) {
-        // One frame that is under way may hold one of them up.
+        // A frame in transmission may delay one of them.
         assert!(pair[1].since(pair[0]) < every + Duration::from_micros(200));
     }
 }
 
-/// A controller that falls silent in the middle of a move is a result: the drives have let go, and the arm stands.
+/// A controller that falls silent in the middle of a move is a valid result: torque is off, and the arm at rest.
 #[test]
 fn silence_of_the_controller_is_a_result() {
     let silent = Instant::from_micros(450_000);
@@ -243,7 +243,7 @@ fn silence_of_the_controller_is_a_result() {
     assert!(!summary.completed);
     let error = summary.error.unwrap();
     assert!(
-        error.starts_with("the controller is silent since 0.44"),
+        error.starts_with("the controller has been silent since 0.44"),
         "{error}"
     );
     assert!(summary.at_rest);
@@ -254,8 +254,8 @@ fn silence_of_the_controller_is_a_result() {
     assert!(summary.speed_utilisation[0] > 0.1);
 }
 
-/// A robot ten times as stiff as its model: the first fault is what is reported, not the move that is refused after it, and
-/// the run goes on until every axis stands.
+/// A robot ten times as stiff as its model: the first fault is reported, not the move refused after it, and the run
+/// continues until every axis is at rest.
 #[test]
 fn the_first_fault_is_reported_and_the_arm_comes_to_rest() {
     let mut config = gate();

@@ -1,4 +1,4 @@
-//! What is bolted to the arm: brake, end stops, motors, encoders, payloads.
+//! Devices of the arm: brake, end stops, motors, encoders, payloads.
 
 use nalgebra::Vector4;
 use proptest::prelude::*;
@@ -111,7 +111,7 @@ fn the_brake_stops_a_falling_load_where_dry_friction_says() {
     let braking = plant.brake().capacity() / mass - 9.81;
     run(&mut plant, 100 * MS);
     assert!(plant.brake().is_sticking());
-    // Below 10 mm/s the brake's law softens, and the last step of 0.25 ms is a coarse one.
+    // Below 10 mm/s the brake's law softens, and the last step of 0.25 ms is coarse.
     let slack = 1e-2 * 1e-2 / braking + braking * 250e-6_f64.powi(2);
     assert!((plant.q()[2] - place - 0.5 * speed * speed / braking).abs() < slack);
 }
@@ -132,14 +132,14 @@ fn an_end_stop_throws_back_three_tenths_of_the_speed() {
         run(&mut plant, 10_000);
         deepest = deepest.max(plant.q()[2] - 0.3);
         let e = plant.energy();
-        // Order 3 at 0.004 rad a step; the kink where contact begins costs one step's share.
+        // Order 3 at 0.004 rad per step; the kink where contact begins costs one step's share.
         assert!(
             e.kinetic + e.elastic < energy + 1e-6,
-            "a stop only takes energy"
+            "a stop only dissipates energy"
         );
         energy = e.kinetic + e.elastic;
     }
-    // Contact begins somewhere within a step, which shifts phases by 400 x 10 us = 0.004 rad at most.
+    // Contact begins within a step, which shifts phases by at most 400 x 10 us = 0.004 rad.
     assert!(
         (deepest * 400.0 - decay(TAU / 6.0)).abs() < 0.004,
         "{deepest}"
@@ -160,7 +160,7 @@ fn end_stops_hold_every_axis_at_full_torque() {
             let mut torque = [0.0; 4];
             torque[axis] = sign * model.drive.motor_torque_limit[axis];
             if axis == 3 {
-                // The nut follows, or the shaft would screw itself.
+                // The nut follows, otherwise the shaft would screw itself.
                 let lift = plant
                     .drive()
                     .motor_torque(&Vector4::new(0.0, 0.0, 0.0, 20.0 * sign));
@@ -195,7 +195,7 @@ fn a_motor_runs_no_faster_than_its_taper() {
     (model.limits.lower[0], model.limits.upper[0]) = (-1e3, 1e3);
     let mut plant = released(&model, START);
     plant.set_motor_torque([8.0, 0.0, 0.0, 0.0]);
-    // Hold the elbow by inertia only; 64 rad/s2 and more reach 628 rad/s at the motor within 200 ms.
+    // The elbow is held by inertia alone; 64 rad/s2 and more reach 628 rad/s at the motor within 200 ms.
     run(&mut plant, 400 * MS);
     let speed = plant.drive().to_motor(&plant.qd().into())[0];
     assert!(
@@ -241,7 +241,7 @@ fn a_sample_holds_the_mean_torque_since_the_last() {
     assert_eq!(
         plant.latch().motor_torque,
         [3.0, 0.0, -0.2, 0.0],
-        "no time has passed: the torque of now"
+        "no time has passed: the present torque"
     );
 }
 

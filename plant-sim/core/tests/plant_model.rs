@@ -1,4 +1,4 @@
-//! Model files: what is accepted, and what a refusal says.
+//! Model files: what is accepted, and the messages of refusals.
 
 use sim::model::{Payload, RobotModel};
 
@@ -9,7 +9,7 @@ fn edited(from: &str, to: &str) -> String {
     assert_eq!(
         DEFAULT.matches(from).count(),
         1,
-        "{from} must stand once in the file"
+        "{from} must occur once in the file"
     );
     DEFAULT.replace(from, to)
 }
@@ -121,7 +121,7 @@ fn what_is_missing_is_named_with_the_line_of_its_object() {
 
 #[test]
 fn the_place_survives_escapes_and_nesting() {
-    // Text with quotes and brackets in front.
+    // Preceded by text with quotes and brackets.
     let text = "{\"note\": \"a \\\" ] } , dh\", \"gh\": {\"a1\": [{}, 1]},\n\"dh\":\n{\"alpha\": [0, 3.141592653589793, 0, 0],\n\"a1\": true}}";
     assert_eq!(
         refusal(text),
@@ -129,7 +129,7 @@ fn the_place_survives_escapes_and_nesting() {
     );
 }
 
-/// Which of two was meant cannot be known.
+/// There is no way to know which of two was meant.
 #[test]
 fn keys_that_stand_twice_are_refused() {
     for (from, to) in [
@@ -137,7 +137,7 @@ fn keys_that_stand_twice_are_refused() {
         (r#""units""#, r#""drive": {}, "units""#),
     ] {
         let message = refusal(&edited(from, to));
-        assert!(message.contains("stands twice in one object"), "{message}");
+        assert!(message.contains("occurs twice in one object"), "{message}");
     }
 }
 
@@ -175,7 +175,7 @@ fn unknown_keys_are_warned_of_with_the_nearest_known_one() {
 #[test]
 fn physics_that_no_robot_has_is_refused() {
     for (from, to, expected) in [
-        // Moments of inertia of no body.
+        // Moments of inertia that no body has.
         (
             r#""inertia_com_diag": [0.053, 0.53, 0.55]"#,
             r#""inertia_com_diag": [0.053, 0.53, 5.0]"#,
@@ -185,7 +185,7 @@ fn physics_that_no_robot_has_is_refused() {
         (
             r#""a1": 0.56"#,
             r#""a1": 560"#,
-            "dh.a1 is 560; it must be a number > 0, at most 10 m; lengths are in m: 560 mm are 0.56",
+            "dh.a1 is 560; it must be a number > 0, at most 10 m; lengths are in m: 560 mm is 0.56",
         ),
         (
             r#"0.3, 6.98"#,
@@ -195,7 +195,7 @@ fn physics_that_no_robot_has_is_refused() {
         (
             r#"2.530727415391778, 0.3"#,
             r#"145, 0.3"#,
-            "joint_limits.upper[1] is 145; it must be a number from -20 to 20 rad; angles are in rad: 145 degrees are 2.53",
+            "joint_limits.upper[1] is 145; it must be a number from -20 to 20 rad; angles are in rad: 145 degrees is 2.53",
         ),
         (r#""SI: m, kg"#, r#""mm, g"#, "units is "),
         (
@@ -220,7 +220,7 @@ fn physics_that_no_robot_has_is_refused() {
             r#""motor_rated_torque": [9.0"#,
             "drive.motor_rated_torque[0] is 9; it must be at most the motor's limit, 8 N m",
         ),
-        // What frames carry.
+        // Limits of frames.
         (
             r#""motor_max_speed_rad_s": [628.3"#,
             r#""motor_max_speed_rad_s": [6283"#,
@@ -237,7 +237,8 @@ fn physics_that_no_robot_has_is_refused() {
         let message = refusal(&edited(from, to));
         assert!(
             message.contains(expected),
-            "{message}\nshould say {expected}"
+            "{message}
+should contain {expected}"
         );
     }
 }
@@ -313,7 +314,7 @@ fn payloads_of_no_body_are_refused() {
         ),
         (
             r#"{"mass": 2, "com_flange_frame": [0, 0, 50], "inertia_com_diag": [0, 0, 0]}"#,
-            "com_flange_frame[2] is 50; it must be a number from -1 to 1 m; lengths are in m: 50 mm are 0.05",
+            "com_flange_frame[2] is 50; it must be a number from -1 to 1 m; lengths are in m: 50 mm is 0.05",
         ),
         (
             r#"{"mass": 2, "com_flange_frame": [0, 0, 0], "inertia_com_diag": [0, 0, 0], "masss": 3}"#,

@@ -1,4 +1,4 @@
-//! The plant in time, against conservation laws and closed forms.
+//! The plant over time, against conservation laws and closed forms.
 
 use nalgebra::Vector4;
 use sim::model::{Payload, RobotModel};
@@ -19,19 +19,19 @@ fn frictionless() -> RobotModel {
     model
 }
 
-/// A robot whose lift is alone with its mass: no rotor ties it to axis 4.
+/// A robot whose lift is a lone mass: no rotor couples it to axis 4.
 fn lone_lift(model: RobotModel) -> RobotModel {
     let mut model = model;
     model.drive.rotor_inertia[2] = 0.0;
     model
 }
 
-/// Mass of what the lift moves, kg.
+/// Mass moved by the lift, kg.
 fn lift_mass(model: &RobotModel) -> f64 {
     model.links[2].mass + model.links[3].mass
 }
 
-/// A robot at rest at `q` whose brake has just opened, with its motors on; the clock stands at [`Brake::RELEASE_NS`].
+/// A robot at rest at `q` with its brake just opened and its motors on; its time is [`Brake::RELEASE_NS`].
 fn released(model: &RobotModel, q: [f64; 4]) -> Plant {
     let mut plant = Plant::new(model, q);
     plant.set_brake(false);
@@ -45,7 +45,7 @@ fn run(plant: &mut Plant, ns: u64) {
     plant.advance_to(plant.now() + ns);
 }
 
-/// Thrown into the air: all axes in motion, an eccentric payload, no torque.
+/// In free motion: all axes moving, an eccentric payload, no torque.
 fn thrown(model: &RobotModel) -> Plant {
     let mut plant = released(model, START);
     plant.attach(ECCENTRIC);
@@ -53,8 +53,8 @@ fn thrown(model: &RobotModel) -> Plant {
     plant
 }
 
-/// Relative error that the default step may make in `seconds` of [`thrown`]: order 3, the fastest motion in it is the
-/// turning of the payload against the arm at less than 20 rad/s, and the error constants are below one.
+/// Relative error allowed for the default step in `seconds` of [`thrown`]: order 3, fastest motion is the rotation of
+/// the payload relative to the arm at less than 20 rad/s, and the error constants are below one.
 fn step_error(seconds: f64) -> f64 {
     let rate = 20.0;
     (rate * Plant::MAX_STEP_NS as f64 * 1e-9).powi(3) * rate * seconds
@@ -86,7 +86,7 @@ fn momentum_about_axis_1_is_kept_without_friction() {
     assert!(drift < step_error(0.2), "{drift:e}");
 }
 
-/// State after 100 ms at a given step, with the friction of the real robot or without.
+/// State after 100 ms at a given step, of this robot with or without friction.
 fn state_after(model: &RobotModel, step: u64) -> nalgebra::SVector<f64, 8> {
     let mut plant = thrown(model);
     plant.set_max_step(step);
@@ -100,7 +100,7 @@ fn integration_is_of_order_three_with_and_without_friction() {
         let exact = state_after(&model, 10_000);
         let error = |step| (state_after(&model, step) - exact).norm();
         for step in [500_000, 250_000] {
-            // Half the step, an eighth of the error; half an order to either side for the next term of the series.
+            // Half the step, an eighth of the error; half an order either way for the next term of the series.
             let ratio = error(step) / error(step / 2);
             assert!((5.7..11.3).contains(&ratio), "{step} ns: {ratio}");
         }
@@ -125,7 +125,7 @@ fn a_damped_lift_approaches_its_terminal_speed() {
     run(&mut plant, 200 * MS);
     let terminal = mass * 9.81 / 40.0;
     let speed = terminal * (1.0 - (-rate * 0.2).exp());
-    // Each step errs by less than (rate h)^4 of the deviation from the terminal speed.
+    // The error of each step is less than (rate h)^4 of the deviation from the terminal speed.
     let bound = 800.0 * (rate * 250e-6).powi(4) * terminal;
     assert!(
         (plant.qd()[2] - speed).abs() < bound,
@@ -136,7 +136,7 @@ fn a_damped_lift_approaches_its_terminal_speed() {
 
 #[test]
 fn energy_is_accounted_for_in_rough_use() {
-    // All axes driven back and forth at full torque, through friction, into the end stops, with the brake thrown in.
+    // All axes driven back and forth at full torque, through friction, into the end stops, including the brake.
     let imbalance = |step: u64| {
         let mut plant = released(&RobotModel::irb_930_22_105(), START);
         plant.attach(ECCENTRIC);
@@ -154,7 +154,7 @@ fn energy_is_accounted_for_in_rough_use() {
         }
         ((balance(&plant) - before) / plant.energy().lost).abs()
     };
-    // Where a force has a kink - a reversal, a stop, the brake - a step is only of order 1. A kink in every stretch of
+    // Where a force has a kink - a reversal, a stop, the brake - a step is only of order 1. A kink in every
     // 50 ms costs at most one step's share of the energy, and halving the step four times must at least halve it twice.
     let (coarse, fine) = (imbalance(250_000), imbalance(15_625));
     assert!(coarse < 0.25 / 50.0, "{coarse:e}");
@@ -172,7 +172,7 @@ fn friction_stops_an_axis_where_coulomb_says_and_keeps_it_there() {
         let mut plant = released(&model, [0.0, 0.5, 0.01, 0.0]);
         plant.set_speed([0.0, 0.0, 1.0, 0.0]);
         run(&mut plant, 500 * MS);
-        // The end of the motion falls into one step, and takes longer by the time in which tanh builds up.
+        // The end of the motion is within one step, and is delayed by the time in which tanh builds up.
         let distance = 0.5 / deceleration;
         let error = (plant.q()[2] - 0.01 - distance).abs();
         assert!(
@@ -196,7 +196,7 @@ fn steep_friction_carries_a_load_without_chatter() {
     run(&mut plant, 10 * MS);
     for _ in 0..100 {
         run(&mut plant, MS);
-        // The law itself lets a loaded axis creep: tanh(v / eps) = load / level. That, and nothing on top of it.
+        // The law itself lets a loaded axis creep at tanh(v / eps) = load / level, and there must be no more than that.
         let creep = 1e-5 * load.atanh();
         assert!(
             (plant.qd()[2] - creep).abs() < 1e-3 * creep,

@@ -1,4 +1,4 @@
-//! Scenario texts: what is refused before anything runs, where, and what is allowed.
+//! Scenario texts: what is refused before anything runs, with place and allowed values.
 
 use sim::scenario::{Scenario, Source};
 use sim::setup::RunConfig;
@@ -20,7 +20,7 @@ jump = { to = [0.6, 0.1, -0.2, 0.0], top = -0.15, clearance = 0.005 }
 dwell = 0.1
 ";
 
-/// What is said of the text with one passage replaced, before a run.
+/// The refusal, before a run, of the text with one passage replaced.
 fn refusal(from: &str, to: &str) -> String {
     assert_eq!(BASE.matches(from).count(), 1, "{from}");
     said_of(&BASE.replace(from, to))
@@ -125,24 +125,24 @@ fn values_out_of_range_are_named_with_place_value_and_range() {
         (
             "to = [0.6, 0.1, -0.2, 0.0]",
             "to = [600, 100, -200, 0.0]",
-            "line 13, column 16: cycle[0].jump.to[0] is 600; allowed: a number from -10 to 10 m; lengths are in m: 600 mm are 0.6",
+            "line 13, column 16: cycle[0].jump.to[0] is 600; allowed: a number from -10 to 10 m; lengths are in m: 600 mm is 0.6",
         ),
         (
             "to = [0.6, 0.1, -0.2, 0.0]",
             "to = [0.6, 0.1, -0.2, 90.0]",
-            "cycle[0].jump.to[3] is 90; allowed: a number from -12.566370614359172 to 12.566370614359172 rad; angles are in rad: 90 degrees are 1.570796",
+            "cycle[0].jump.to[3] is 90; allowed: a number from -12.566370614359172 to 12.566370614359172 rad; angles are in rad: 90 degrees is 1.570796",
         ),
         (
             "top = -0.15",
             "top = -150",
-            "lengths are in m: -150 mm are -0.15",
+            "lengths are in m: -150 mm is -0.15",
         ),
         (
             "[0.5, 0.1, -0.2, 0.0]",
             "[500, 0.1, -0.2, 0.0]",
             "start[0] is 500",
         ),
-        // Bodies that there are not, or that no request can carry.
+        // Impossible bodies, and bodies that no request can carry.
         (
             "mass = 2.0",
             "mass = nan",
@@ -166,7 +166,7 @@ fn values_out_of_range_are_named_with_place_value_and_range() {
         (
             "[0.0, 0.0, 0.05]",
             "[0.0, 0.0, 50.0]",
-            "lengths are in m: 50 mm are 0.05",
+            "lengths are in m: 50 mm is 0.05",
         ),
         (
             "[0.008, 0.008, 0.01]",
@@ -211,13 +211,13 @@ fn what_this_robot_cannot_do_is_refused_before_the_run() {
             "[gains]\nbandwidth = 100\ndamping = nan\nobserver = 100\n[payload]",
             "gains.damping is NaN; allowed: 0.1 to 5 at 1000 Hz",
         ),
-        // The hand already holds the payload of the start.
+        // The gripper already holds the payload of the start.
         (
             "dwell = 0.1",
             "pick = { mass = 5, com_flange_frame = [0, 0, 0], inertia_com_diag = [0, 0, 0] }",
             "cycle[1].pick is a payload of 5 kg; allowed: an empty gripper; it holds 2 kg",
         ),
-        // The second cycle begins with an empty hand.
+        // The second cycle begins with an empty gripper.
         (
             "dwell = 0.1",
             "place = {}",
@@ -232,7 +232,7 @@ fn what_this_robot_cannot_do_is_refused_before_the_run() {
     }
 }
 
-/// What one cycle leaves in the hand, the next one finds there.
+/// The gripper begins a cycle with whatever the previous one left in it.
 #[test]
 fn a_hand_is_followed_from_cycle_to_cycle() {
     let empty = BASE.replace("mass = 2.0", "mass = 0.0");

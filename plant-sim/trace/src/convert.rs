@@ -18,7 +18,7 @@ pub enum Target {
     Candump,
 }
 
-/// Writes records in another format as they come.
+/// Writes records in another format, one by one.
 pub struct Converter<W: Write>(Kind<W>);
 
 enum Kind<W: Write> {
@@ -52,7 +52,7 @@ impl<W: Write> Converter<W> {
         }
     }
 
-    /// Passes on what the file's own buffer holds, so that a reader at the other end of a pipe sees it.
+    /// Flushes the file's own buffer, so that a reader at the other end of a pipe sees everything.
     ///
     /// # Errors
     /// Those of the sink.
@@ -64,7 +64,7 @@ impl<W: Write> Converter<W> {
         }
     }
 
-    /// Ends the file, flushes it and gives the sink back.
+    /// Ends the file, flushes it and returns the sink.
     ///
     /// # Errors
     /// Those of the sink.
@@ -84,7 +84,7 @@ impl<W: Write> Converter<W> {
 struct Interfaces(Vec<Interface>);
 
 impl Interfaces {
-    /// Number of this interface from 0 on, and whether it is new.
+    /// Number of this interface, from 0, and whether it is new.
     fn number(&mut self, interface: Interface) -> (usize, bool) {
         match self.0.iter().position(|known| *known == interface) {
             Some(number) => (number, false),

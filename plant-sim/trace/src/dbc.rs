@@ -1,7 +1,8 @@
-//! The message table as a DBC file, the format in which CAN tools exchange what frames mean (Vector, DBC 1.0).
+//! The message table as a DBC file, the format in which CAN tools exchange the meaning of frames (Vector, DBC 1.0).
 //!
 //! It is written from the same table that the codec reads, so the two cannot drift apart. FD frames are marked by the
-//! attributes `VFrameFormat` and `CANFD_BRS`, real numbers by `SIG_VALTYPE_`; a set of flags becomes one signal a bit.
+//! attributes `VFrameFormat` and `CANFD_BRS`, real numbers by `SIG_VALTYPE_`; a set of flags becomes one signal per
+//! bit.
 
 use std::fmt::Write as _;
 
@@ -13,11 +14,11 @@ use protocol::table::{self, TABLE};
 
 use crate::fields::full_name;
 
-/// Stands for no node or any node.
+/// No node, or any node.
 const ANYBODY: &str = "Vector__XXX";
-/// Cycle time of what is sent every sample, ms: the bench's default rate of 1 kHz.
+/// Cycle time of messages sent every sample, ms: the default rate of 1 kHz.
 const SAMPLE_MS: u32 = 1;
-/// Frame formats, by the numbers that the attribute `VFrameFormat` gives them.
+/// Frame formats, by their numbers in the attribute `VFrameFormat`.
 const FRAME_FORMATS: [&str; 16] = [
     "StandardCAN",
     "ExtendedCAN",
@@ -174,7 +175,7 @@ fn cells_of(signal: &Signal) -> Vec<Cell> {
     signal.elements.iter().enumerate().map(element).collect()
 }
 
-/// The double that is written like this float, not the one that equals it: 0.1 instead of 0.10000000149.
+/// The double with the same shortest decimal form as this float, not the equal one: 0.1 instead of 0.10000000149.
 fn shortest(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }
@@ -250,7 +251,7 @@ fn receivers(info: &MessageInfo) -> String {
     names.join(",")
 }
 
-/// A number without forty digits.
+/// A number in short form.
 fn number(value: f64) -> String {
     if value.abs() < 1e15 {
         value.to_string()
@@ -283,7 +284,7 @@ fn comments(text: &mut String) {
     }
 }
 
-/// What the parameters of a server are; the controller also answers for the drives.
+/// Parameters of a server; the controller also answers for the drives.
 fn numbers(server: Server) -> String {
     let rows: Vec<String> = parameters::all()
         .filter(|parameter| server == Server::Controller || parameter.server() == server)

@@ -1,4 +1,4 @@
-//! Traces in words: a line of text for each frame, a CSV row for each field, or a JSON object for each frame.
+//! Decoded traces: a line of text per frame, a CSV row per field, or a JSON object per frame.
 
 use std::io::{self, Write};
 
@@ -10,19 +10,19 @@ use serde_json::Value as Json;
 use super::fields::{Decoded, Field, Value, full_name};
 use super::{Entry, ErrorFrame, Record};
 
-/// How a decoded trace is written.
+/// Format of a decoded trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// A line for a person.
+    /// A line of text per frame.
     Text,
-    /// `time_s,interface,id,message,counter,field,value,unit`: one row a field. A frame that is refused, foreign or
-    /// an error frame has the fields `error` and `raw`.
+    /// `time_s,interface,id,message,counter,field,value,unit`: one row per field. A frame that is refused,
+    /// foreign or an error frame has the fields `error` and `raw`.
     Csv,
-    /// One object a frame.
+    /// One object per frame.
     JsonLines,
 }
 
-/// Writes decoded records as they come.
+/// Writes decoded records, one by one.
 pub struct Decoder<W: Write> {
     sink: W,
     format: Format,
@@ -53,7 +53,7 @@ impl<W: Write> Decoder<W> {
         }
     }
 
-    /// Passes on what the sink holds back, so that a reader at the other end of a pipe sees it.
+    /// Flushes the sink, so that a reader at the other end of a pipe sees everything.
     ///
     /// # Errors
     /// Those of the sink.
@@ -61,7 +61,7 @@ impl<W: Write> Decoder<W> {
         self.sink.flush()
     }
 
-    /// Flushes and gives the sink back.
+    /// Flushes and returns the sink.
     ///
     /// # Errors
     /// Those of the sink.
@@ -115,14 +115,14 @@ impl<W: Write> Decoder<W> {
         Ok(())
     }
 
-    /// Written by hand: names, units and messages come from tables and hold nothing that JSON would have to escape.
+    /// Written by hand: names, units and messages come from tables and contain nothing that JSON has to escape.
     fn json(&mut self, record: &Record, content: &Content) -> io::Result<()> {
         let sink = &mut self.sink;
         write!(
             sink,
             r#"{{"time_s":{},"interface":{},"id":"{}","message":"{}""#,
             Seconds(record.time_us),
-            // An interface may be called anything.
+            // An interface may have any name.
             Json::from(record.interface.to_string()),
             content.id(),
             content.name()
@@ -156,16 +156,16 @@ impl<W: Write> Decoder<W> {
     }
 }
 
-/// Counter and fields of a record in words, without time, interface and identifier.
+/// Counter and fields of a record as text, without time, interface and identifier.
 #[must_use]
 pub fn describe(record: &Record) -> String {
     let mut text = Vec::new();
-    // A vector takes everything, and everything written is text.
+    // Writing to a vector cannot fail, and everything written is text.
     let _ = Content::new(record).words(&mut text);
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// What there is to say about a record.
+/// Decoded content of a record.
 enum Content<'a> {
     Message(&'a CanFrame, Decoded),
     Refused(&'a CanFrame, DecodeError),
@@ -183,7 +183,7 @@ impl<'a> Content<'a> {
         }
     }
 
-    /// Counter and fields, or what is wrong and the bytes.
+    /// Counter and fields, or the error and the bytes.
     fn words(&self, sink: &mut impl Write) -> io::Result<()> {
         let Self::Message(_, decoded) = self else {
             return write!(sink, "{}: {}", self.error(), self.raw());
@@ -245,7 +245,7 @@ pub(super) fn id(frame: &CanFrame) -> String {
     }
 }
 
-/// A time with all its microseconds, exactly.
+/// A time with all its microseconds, exact.
 pub(super) struct Seconds(pub u64);
 
 impl std::fmt::Display for Seconds {
@@ -304,7 +304,7 @@ fn json_element(
             let names: Vec<String> = value.flags().map(|name| format!("\"{name}\"")).collect();
             write!(sink, "[{}]", names.join(","))?;
         }
-        // Digits enough to tell this float from every other.
+        // Enough digits to distinguish this float from every other.
         Value::Unsigned(_) | Value::Signed(_) | Value::Float(_) => write!(sink, "{value}")?,
     }
     if !unit.is_empty() {

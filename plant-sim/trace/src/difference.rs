@@ -1,4 +1,4 @@
-//! The first difference between the frame that was due and the one that came, as a person looks for it.
+//! The first difference between an expected frame and the one received, for a person to read.
 
 use std::fmt;
 
@@ -9,40 +9,40 @@ use protocol::table;
 
 use crate::fields::{Decoded, full_name};
 
-/// What two controllers that should do the same have done differently.
+/// A difference between two controllers that should do the same.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Difference {
     /// A field has another value.
     Field {
-        /// The frame that was due.
+        /// The expected frame.
         due: Box<CanFrame>,
         /// Field, or "counter".
         field: String,
-        /// Value that was due.
+        /// Value expected.
         expected: String,
-        /// Value that came.
+        /// Value received.
         found: String,
     },
-    /// The frame that came is damaged.
+    /// The frame received is damaged.
     Damaged {
-        /// The frame that was due.
+        /// The expected frame.
         due: Box<CanFrame>,
-        /// What is wrong with the other.
+        /// What is wrong with the received one.
         error: DecodeError,
     },
-    /// Another message came.
+    /// Another message was received.
     Other {
-        /// The frame that was due.
+        /// The expected frame.
         due: Box<CanFrame>,
-        /// The frame that came.
+        /// The received frame.
         found: Box<CanFrame>,
     },
-    /// Nothing came.
+    /// Nothing was received.
     Missing {
-        /// The frame that was due.
+        /// The expected frame.
         due: Box<CanFrame>,
     },
-    /// A frame came that was not due.
+    /// An unexpected frame was received.
     Surplus {
         /// The frame.
         found: Box<CanFrame>,
@@ -67,7 +67,7 @@ impl Difference {
         }
     }
 
-    /// What differs in two frames of one message.
+    /// The difference between two frames of one message.
     fn within(due: Box<CanFrame>, found: Box<CanFrame>) -> Self {
         let (expected, came) = match (Decoded::new(&due), Decoded::new(&found)) {
             (Ok(expected), Ok(came)) => (expected, came),
@@ -84,7 +84,7 @@ impl Difference {
             for ((element, _, one_value), (_, _, other_value)) in
                 one.elements().zip(other.elements())
             {
-                // As text, which tells 0 from -0.
+                // As text, which distinguishes 0 from -0.
                 let (one_value, other_value) = (one_value.to_string(), other_value.to_string());
                 if one_value != other_value {
                     let name = full_name(one.signal.name, element);
@@ -92,7 +92,7 @@ impl Difference {
                 }
             }
         }
-        // Content is equal, so it is the counter, the only other thing that a valid frame holds.
+        // The content is equal, so it is the counter, the only other part of a valid frame.
         let counter = |decoded: &Decoded| decoded.counter.unwrap_or(0).to_string();
         field("counter".into(), counter(&expected), counter(&came))
     }
@@ -115,14 +115,14 @@ impl fmt::Display for Difference {
                 name(due)
             ),
             Self::Missing { due } => write!(f, "{} is missing ({due})", name(due)),
-            Self::Surplus { found } => write!(f, "{} is not due ({found})", name(found)),
+            Self::Surplus { found } => write!(f, "{} is not expected ({found})", name(found)),
         }
     }
 }
 
 impl std::error::Error for Difference {}
 
-/// Message of a frame, and the sample that it belongs to if that is in it.
+/// Message of a frame, with its sample if the frame has it.
 fn name(frame: &CanFrame) -> String {
     let name = table::of_frame(frame).map_or("an unknown frame", |info| info.name);
     match codec::decode(frame).map(|received| received.message) {
@@ -161,7 +161,7 @@ mod tests {
         assert_eq!(Difference::between(None, None), None);
     }
 
-    /// One bit of one torque; a sample before its torque; a sign of nothing; the counter last.
+    /// One bit of one torque; the sample before its torque; the sign of zero; the counter last.
     #[test]
     fn the_first_field_that_differs_is_named() {
         let due = command(4711, [1.0, 2.0, 3.0, 0.0], 5);
@@ -197,7 +197,7 @@ mod tests {
         );
         assert_eq!(
             says(None, Some(&due)),
-            format!("sample 8: Command is not due ({due})")
+            format!("sample 8: Command is not expected ({due})")
         );
         let heartbeat = CanFrame::classical(StandardId::new(0x741).unwrap(), &[]).unwrap();
         assert!(

@@ -1,8 +1,8 @@
-//! What SocketCAN reports instead of a frame, in the words of can-utils.
+//! Error frames of SocketCAN, in the terms of can-utils.
 
 use std::fmt;
 
-/// Error frame of SocketCAN: a state or an error that a controller reported.
+/// Error frame of SocketCAN: a state or an error reported by a controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ErrorFrame {
     /// Error classes, a bit set of 29 bits (`linux/can/error.h`).
@@ -65,7 +65,7 @@ impl ErrorFrame {
         })
     }
 
-    /// Details, as the classes lay down; what a report leaves out is zero.
+    /// Details, as defined by the classes; missing ones are zero.
     #[must_use]
     pub fn data(&self) -> &[u8] {
         &self.data[..usize::from(self.len)]
@@ -135,7 +135,7 @@ fn bits(set: u32) -> impl Iterator<Item = usize> {
     (0..u32::BITS as usize).filter(move |bit| set >> bit & 1 == 1)
 }
 
-/// Names of the bits that are set, a bit without a name as its number.
+/// Names of the set bits; a bit without a name by its number.
 fn names(set: u8, all: &[&str]) -> String {
     let words: Vec<String> = bits(set.into())
         .map(|bit| {

@@ -1,4 +1,4 @@
-//! Frames taken apart by the message table: every field with its name, its unit and its value.
+//! Frames decoded by the message table: every field with name, unit and value.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use protocol::table;
 /// A frame that passed every check of the protocol.
 #[derive(Clone, Copy, Debug)]
 pub struct Decoded {
-    /// What the identifier means.
+    /// Entry of the message table.
     pub info: &'static MessageInfo,
     /// End-to-end counter, if the message carries one.
     pub counter: Option<u8>,
@@ -19,7 +19,7 @@ pub struct Decoded {
 }
 
 impl Decoded {
-    /// Takes a frame apart.
+    /// Decodes a frame.
     ///
     /// # Errors
     /// The frame does not decode, or is not canonical.
@@ -55,10 +55,10 @@ impl Decoded {
     }
 }
 
-/// One signal of a frame: a number, or one for each axis or coordinate.
+/// One signal of a frame: a number, or one per axis or coordinate.
 #[derive(Clone, Copy, Debug)]
 pub struct Field<'a> {
-    /// What it is.
+    /// Its description.
     pub signal: &'static Signal,
     bytes: &'a [u8],
 }
@@ -91,7 +91,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// Value of the little-endian `bytes`, as many as the kind has.
+    /// Value of the little-endian `bytes`, as many as the kind takes.
     fn new(kind: Kind, bytes: &[u8]) -> Self {
         let raw = bytes
             .iter()
@@ -126,7 +126,7 @@ impl Value {
     }
 }
 
-/// Numbers with as many digits as tell them from their neighbours; flags as `ready|torque-on`, none as `-`.
+/// Numbers with enough digits to distinguish them from their neighbours; flags as `ready|torque-on`, none as `-`.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -1,16 +1,16 @@
-//! Bus traces as candump logs, one frame a line: what the bench writes, can-utils reads, and the other way round.
+//! Bus traces as candump logs, one frame per line, interchangeable with can-utils in both directions.
 //!
-//! # What lives here
+//! # Contents
 //!
 //! [`Reader`] and [`Writer`] turn lines into [`Record`]s and back. [`decode`] names every field of a frame, [`stats`]
 //! counts rates, jitter, gaps and losses, [`convert`] writes pcapng and Vector ASC, [`dbc`] the message table for other
-//! tools. All stream: memory does not grow with a trace. The crate leans on [`protocol`] alone; what needs a robot or a
-//! controller (replay, check, plot) is in `plant-sim`.
+//! tools. All of them stream: memory does not grow with a trace. The crate depends on [`protocol`] alone; anything that
+//! needs a robot or a controller (replay, check, plot) is in `plant-sim`.
 //!
-//! # The way of one Feedback frame
+//! # The path of one Feedback frame
 //!
-//! Delivered on the bus it becomes one line through [`Writer`]; later [`Reader`] makes the same frame of the line, and
-//! [`decode`] looks it up in the protocol's table to print counts, velocities and torques with their units.
+//! When delivered on the bus it becomes one line through [`Writer`]; later [`Reader`] turns the line back into the same
+//! frame, and [`decode`] uses the protocol's table to print counts, velocities and torques with their units.
 //!
 //! # The format
 //!
@@ -22,8 +22,8 @@
 //! ```
 //!
 //! Three identifier digits are an 11-bit identifier, eight a 29-bit one or, with 0x20000000, an error frame as SocketCAN
-//! reports it. `##` introduces an FD frame, its first digit holds the flags. The [`Reader`] also takes what candump prints
-//! on a screen, Vector ASC and pcapng.
+//! reports it. `##` introduces an FD frame, its first digit holds the flags. The [`Reader`] also accepts candump's
+//! screen output, Vector ASC and pcapng.
 
 #![forbid(unsafe_code)]
 
@@ -54,23 +54,23 @@ const ERROR_FLAG: u32 = 0x2000_0000;
 const FLAG_BRS: u8 = 0x1;
 /// Flag digit of an FD frame: error state indicator (`CANFD_ESI`).
 const FLAG_ESI: u8 = 0x2;
-/// Flag digit of an FD frame: it is one (`CANFD_FDF`). Newer kernels set it; `##` says it already.
+/// Flag digit of an FD frame: FD format (`CANFD_FDF`). Newer kernels set it; `##` already implies it.
 const FLAG_FDF: u8 = 0x4;
 
 /// One line of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
-    /// When, us from an origin that the log does not tell.
+    /// Time, us from an origin that the log does not give.
     pub time_us: u64,
-    /// Where.
+    /// Interface.
     pub interface: Interface,
-    /// Which way, if the log says so.
+    /// Direction, if the log has it.
     pub direction: Option<Direction>,
-    /// What.
+    /// Content.
     pub entry: Entry,
 }
 
-/// Which way a frame went, as the host that logged it saw it.
+/// Direction of a frame, as seen by the host that logged it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Received from another node.
@@ -95,7 +95,7 @@ impl Direction {
 pub enum Entry {
     /// A frame that was received.
     Frame(CanFrame),
-    /// A state or error that a controller reported; nothing that was on the bus.
+    /// A state or error reported by a controller; not a frame on the bus.
     Error(ErrorFrame),
 }
 
@@ -110,7 +110,7 @@ impl Interface {
     /// Longest name, bytes (`IFNAMSIZ` less the terminating zero).
     pub const MAX: usize = 15;
 
-    /// The name that the simulated bus goes by.
+    /// Name of the simulated bus.
     pub const CAN0: Self = Self {
         name: *b"can0\0\0\0\0\0\0\0\0\0\0\0",
         len: 4,
@@ -124,7 +124,7 @@ impl Interface {
 
     /// Name of the interface of this number, counted from 0: `can0`.
     fn numbered(number: usize) -> Self {
-        // A number too long for a name is of no machine.
+        // No machine has a number too long for a name.
         Self::new(&format!("can{number}")).unwrap_or(Self::CAN0)
     }
 
@@ -160,7 +160,7 @@ impl fmt::Debug for Interface {
     }
 }
 
-/// SHA-256 of a log; `Display` gives the hex digits that `sha256sum` gives for the file.
+/// SHA-256 of a log; `Display` gives the same hex digits as `sha256sum` for the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogHash(pub [u8; 32]);
 

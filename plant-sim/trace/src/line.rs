@@ -6,15 +6,15 @@ use super::{
     Direction, ERROR_FLAG, Entry, ErrorFrame, FLAG_BRS, FLAG_ESI, FLAG_FDF, Interface, Record,
 };
 
-/// Longest line, line feed not counted, bytes. The longest that can be meant, an FD frame in ASC or on a screen, has
-/// fewer than 500.
+/// Longest line without its line feed, bytes. The longest valid one, an FD frame in ASC or on a screen, has fewer than
+/// 500.
 pub(super) const MAX_LINE: usize = 1024;
 
 /// What is wrong with a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Problem {
     /// Longer than any line of a log.
-    #[error("longer than {MAX_LINE} bytes; no line of a log is")]
+    #[error("longer than {MAX_LINE} bytes, the longest line of a log")]
     TooLong,
     /// The file ends within the line.
     #[error("the log was cut off within this frame")]
@@ -30,7 +30,7 @@ pub enum Problem {
     /// Wrong number of decimals.
     #[error("timestamp has {0} decimals; 1 to 9 are allowed")]
     Decimals(usize),
-    /// Screen output whose times cannot be known.
+    /// Screen output with unknown time origin.
     #[error(
         "candump's output for the screen without absolute times; record with candump -L (or candump -t a)"
     )]
@@ -43,13 +43,13 @@ pub enum Problem {
         "length code {0:X} above 8 of a classical frame is not supported; record without candump -8"
     )]
     LengthCode(u8),
-    /// Line of an ASC file that begins like a frame and is none.
-    #[error("{0}; not a frame as Vector ASC has them")]
+    /// Line of an ASC file that begins like a frame but is not one.
+    #[error("{0}; not a frame of Vector ASC")]
     Asc(&'static str),
-    /// Packet of a pcapng file that is no CAN frame.
+    /// Packet of a pcapng file that is not a CAN frame.
     #[error("{0}")]
     Packet(&'static str),
-    /// More microseconds than 64 bits hold.
+    /// More microseconds than fit in 64 bits.
     #[error("timestamp does not fit 64 bits of us; {} seconds are allowed", u64::MAX / 1_000_000 - 1)]
     TimestampRange,
     /// No interface name, or a wrong one.
@@ -77,7 +77,7 @@ pub enum Problem {
     Hex {
         /// Byte of the line, counted from 1.
         column: usize,
-        /// What is there.
+        /// What was found.
         found: char,
     },
     /// Half a byte at the end.
@@ -88,7 +88,7 @@ pub enum Problem {
     Length {
         /// Data bytes on the line.
         found: usize,
-        /// What a frame of this kind may have.
+        /// What is allowed for this kind.
         allowed: &'static str,
     },
     /// Remote frame with more than a length.
@@ -141,7 +141,7 @@ pub(super) fn parse(line: &[u8]) -> Result<Record, Problem> {
     })
 }
 
-/// Microseconds of `seconds.decimals`; what is finer is cut off.
+/// Microseconds of `seconds.decimals`; finer digits are cut off.
 pub(super) fn timestamp(text: &[u8]) -> Result<u64, Problem> {
     let (seconds, decimals) = split_at_byte(text, b'.').ok_or(Problem::Timestamp)?;
     let digits = |text: &[u8]| !text.is_empty() && text.iter().all(u8::is_ascii_digit);
@@ -161,11 +161,11 @@ pub(super) fn timestamp(text: &[u8]) -> Result<u64, Problem> {
         .ok_or(Problem::TimestampRange)
 }
 
-/// Part of a line that remembers where it stands.
+/// Part of a line that knows its position.
 #[derive(Clone, Copy)]
 struct Text<'a> {
     bytes: &'a [u8],
-    /// Of the first byte, counted from 1.
+    /// Column of the first byte, counted from 1.
     column: usize,
 }
 
@@ -313,7 +313,7 @@ fn fd_frame(id: Id, text: Text<'_>) -> Result<CanFrame, Problem> {
 /// An FD frame of exactly this data.
 pub(super) fn fd(id: Id, data: &[u8], brs: bool, esi: bool) -> Result<CanFrame, Problem> {
     let found = data.len();
-    // The frame would pad to the next length: a log holds the frame as it was, so no frame has another length.
+    // The frame would pad to the next length, but a log has frames as they were, so no frame has another length.
     if fd_length(found) != Some(found) {
         return Err(Problem::Length {
             found,
@@ -328,7 +328,7 @@ pub(super) fn fd(id: Id, data: &[u8], brs: bool, esi: bool) -> Result<CanFrame, 
         })
 }
 
-/// What stands before and after the first `byte`.
+/// The text before and after the first `byte`.
 pub(super) fn split_at_byte(text: &[u8], byte: u8) -> Option<(&[u8], &[u8])> {
     let at = text.iter().position(|&b| b == byte)?;
     Some((&text[..at], &text[at + 1..]))

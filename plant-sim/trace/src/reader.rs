@@ -1,4 +1,4 @@
-//! Log reader: record by record, in bounded memory. The format is found from the first bytes.
+//! Log reader: record by record, in bounded memory. The format is detected from the first bytes.
 
 mod asc;
 mod pcapng;
@@ -16,15 +16,15 @@ use super::{
 use asc::Asc;
 use pcapng::Pcapng;
 
-/// Byte order mark of UTF-8, which editors of other systems put in front.
+/// Byte order mark of UTF-8, which editors on other systems prepend.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
-/// Bytes that tell the formats apart.
+/// Bytes that identify the format.
 const MAGIC: u64 = 4;
 
 /// A line that could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The line, or packet of a pcapng file, holds no frame. Reading on continues with the next.
+    /// The line, or packet of a pcapng file, holds no frame. Reading continues with the next.
     #[error("line {line}: {problem}")]
     Line {
         /// Counted from 1.
@@ -42,7 +42,7 @@ pub enum ReadError {
     },
 }
 
-/// Reads a log; an iterator over its records. Empty lines and comments (`#`) are passed over.
+/// Reads a log; an iterator over its records. Empty lines and comments (`#`) are skipped.
 pub struct Reader<R> {
     source: Chain<Cursor<Vec<u8>>, R>,
     format: Option<Format>,
@@ -51,7 +51,7 @@ pub struct Reader<R> {
 }
 
 enum Format {
-    /// candump, log or screen: every line stands for itself.
+    /// candump, log or screen: every line is independent.
     Candump,
     Asc(Asc),
     Pcapng(Pcapng),
@@ -73,12 +73,12 @@ impl<R: BufRead> Reader<R> {
         self.line
     }
 
-    /// Where the bytes come from.
+    /// Source of the bytes.
     pub fn source(&self) -> &R {
         self.source.get_ref().1
     }
 
-    /// Finds the format.
+    /// Detects the format.
     fn begin(&mut self) -> io::Result<Format> {
         let (head, source) = self.source.get_mut();
         let bytes = head.get_mut();
@@ -98,7 +98,7 @@ impl<R: BufRead> Reader<R> {
         })
     }
 
-    /// Fills the buffer with the next line, or with as much of it as any good line has; its line feed included.
+    /// Fills the buffer with the next line, including its line feed, or with as much of it as any good line can have.
     fn fill(&mut self) -> io::Result<()> {
         self.buffer.clear();
         let limit = MAX_LINE as u64 + 1;
@@ -162,7 +162,7 @@ impl<R: BufRead> Reader<R> {
     }
 }
 
-/// Whether a frame at the end of a log without its line feed is all there: one of ours must be as the table says.
+/// Whether a frame at the end of a log without its line feed is complete: one in the table must match it.
 fn is_whole(record: &Record) -> bool {
     match &record.entry {
         Entry::Frame(frame) => table::of_frame(frame).is_none() || codec::decode(frame).is_ok(),

@@ -1,4 +1,4 @@
-//! Which records of a trace count: by identifier, interface and time.
+//! Selection of records of a trace by identifier, interface and time.
 
 use std::str::FromStr;
 
@@ -7,10 +7,10 @@ use protocol::table::TABLE;
 
 use super::{Entry, Interface, Record};
 
-/// Records that are asked for; without an answer to a question, all.
+/// Selection of records; without a criterion, all.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
-    /// Identifiers; with any, error frames do not count.
+    /// Identifiers; with any given, error frames are excluded.
     pub ids: Vec<Ids>,
     /// Interfaces.
     pub interfaces: Vec<Interface>,
@@ -21,13 +21,13 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Whether the record is of an interface that counts.
+    /// Whether the record's interface is selected.
     #[must_use]
     pub fn interface(&self, record: &Record) -> bool {
         self.interfaces.is_empty() || self.interfaces.contains(&record.interface)
     }
 
-    /// Whether the record has an identifier that counts.
+    /// Whether the record's identifier is selected.
     #[must_use]
     pub fn id(&self, record: &Record) -> bool {
         let of_frame = |ids: &Ids| match &record.entry {
@@ -37,7 +37,7 @@ impl Selection {
         self.ids.is_empty() || self.ids.iter().any(of_frame)
     }
 
-    /// Whether the record, of a trace that begins at `first_us`, is in time.
+    /// Whether the record's time is selected, in a trace that begins at `first_us`.
     #[must_use]
     pub fn time(&self, record: &Record, first_us: u64) -> bool {
         let at = |moment: Moment| moment.time_us(first_us);
@@ -54,7 +54,7 @@ pub struct Ids {
 }
 
 impl Ids {
-    /// Identifiers order as in arbitration, where both kinds mix: the kind is compared apart.
+    /// Identifiers order as in arbitration, which mixes both kinds: the kind is compared separately.
     fn contain(self, id: Id) -> bool {
         is_extended(id) == is_extended(self.first) && self.first <= id && id <= self.last
     }
@@ -112,12 +112,12 @@ fn id(text: &str) -> Result<Id, String> {
     })
 }
 
-/// A time: seconds as the trace has them, or after its first record with `+` in front.
+/// A time: seconds as in the trace, or relative to its first record with a leading `+`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
-    /// As the trace has it, us.
+    /// As in the trace, us.
     Absolute(u64),
-    /// From the first record on, us.
+    /// After the first record, us.
     Relative(u64),
 }
 
@@ -138,9 +138,8 @@ impl FromStr for Moment {
             Some(digits) => (digits, true),
             None => (text, false),
         };
-        let time_us = microseconds(digits).ok_or(
-            "allowed: seconds as the trace has them (12.5), or after its first record (+12.5)",
-        )?;
+        let time_us = microseconds(digits)
+            .ok_or("allowed: seconds as in the trace (12.5), or after its first record (+12.5)")?;
         Ok(if relative {
             Self::Relative(time_us)
         } else {
@@ -149,7 +148,7 @@ impl FromStr for Moment {
     }
 }
 
-/// Microseconds of seconds with or without decimals, exactly: a double has too few digits for the time since 1970.
+/// Microseconds of seconds with or without decimals, exact: a double has too few digits for the time since 1970.
 fn microseconds(text: &str) -> Option<u64> {
     let with_point = if text.contains('.') {
         text.to_owned()

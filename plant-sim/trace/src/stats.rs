@@ -1,4 +1,4 @@
-//! What a trace carried: frames, periods, losses, errors and load, by interface, by identifier and in total.
+//! Statistics of a trace: frames, periods, losses, errors and load, by interface, by identifier and in total.
 
 mod periods;
 mod table;
@@ -23,17 +23,17 @@ const WINDOW_US: u64 = 100_000;
 pub struct Gatherer {
     timing: BitTiming,
     skip_us: u64,
-    /// In the order in which they appear: a bus has its own frames and its own load.
+    /// In the order of appearance: each bus has its own frames and load.
     buses: Vec<(Interface, Bus)>,
     clock: Clock,
 }
 
-/// Time of a trace, which may be set forwards and back.
+/// Time of a trace, which may jump forwards and back.
 #[derive(Clone, Copy, Default)]
 struct Clock {
     first_us: Option<u64>,
     newest_us: u64,
-    /// Time in steps that are skipped.
+    /// Time in skipped steps.
     skipped_us: u64,
     skipped: u64,
     backwards: u64,
@@ -42,7 +42,7 @@ struct Clock {
 }
 
 impl Clock {
-    /// Takes the time of a record; `true` if a step before it is skipped.
+    /// Takes the time of a record; `true` if the step before it is skipped.
     fn tick(&mut self, time_us: u64, skip_us: u64) -> bool {
         if self.first_us.is_none() {
             (self.first_us, self.newest_us) = (Some(time_us), time_us);
@@ -68,7 +68,7 @@ impl Clock {
     }
 }
 
-/// What was seen on one interface.
+/// Statistics of one interface in progress.
 #[derive(Default)]
 struct Bus {
     ids: BTreeMap<Id, Tally>,
@@ -82,7 +82,7 @@ struct Bus {
 }
 
 impl Gatherer {
-    /// Nothing seen yet; the load is that of a bus of this timing.
+    /// Empty statistics; the load will be that of a bus of this timing.
     #[must_use]
     pub fn new(timing: BitTiming) -> Self {
         Self {
@@ -93,13 +93,13 @@ impl Gatherer {
         }
     }
 
-    /// Leaves steps of time out that are longer than this, us: neither periods nor time of the trace.
+    /// Leaves out steps of time longer than this, us: they count neither as periods nor as time of the trace.
     #[must_use]
     pub fn skipping(self, skip_us: u64) -> Self {
         Self { skip_us, ..self }
     }
 
-    /// Takes the next record in.
+    /// Adds the next record.
     pub fn record(&mut self, record: &Record) {
         self.clock.tick(record.time_us, self.skip_us);
         let place = self
@@ -115,7 +115,7 @@ impl Gatherer {
             .record(record, self.timing, self.skip_us);
     }
 
-    /// The statistics of what was taken in.
+    /// The statistics of the records added.
     #[must_use]
     pub fn statistics(&self) -> Statistics {
         let buses = || self.buses.iter().map(|(_, bus)| bus);
@@ -169,7 +169,7 @@ impl Bus {
         if let Some(Message::Nmt(nmt)) = tally.frame(record.time_us, frame, busy)
             && nmt.command == NmtCommand::ResetNode
         {
-            // A node that starts again counts from the start.
+            // A restarted node counts from the start.
             for tally in self.ids.values_mut() {
                 tally.reset(nmt.node);
             }
@@ -182,7 +182,7 @@ impl Bus {
 
     fn statistics(&self, name: Interface) -> BusStatistics {
         let span_us = self.clock.span_us();
-        // One instant has neither load nor rate.
+        // A single instant has neither load nor rate.
         let over = |sum: u64, span: f64| if span == 0.0 { 0.0 } else { sum as f64 / span };
         let load = |busy_ns: u64| over(busy_ns, span_us as f64 * 1e3);
         let rate = |frames: u64| over(frames, span_us as f64 / 1e6);
@@ -193,7 +193,7 @@ impl Bus {
             errors: self.errors.clone(),
             span_s: span_us as f64 / 1e6,
             load: load(self.busy_ns),
-            // A trace shorter than a window is its own busiest part.
+            // A trace shorter than a window is its own busiest window.
             peak_load: (self.peak_ns as f64 / (WINDOW_US * 1000) as f64).max(load(self.busy_ns)),
             ids: self
                 .ids
@@ -204,18 +204,18 @@ impl Bus {
     }
 }
 
-/// Statistics of a trace. `Display` makes a table of them.
+/// Statistics of a trace. `Display` formats them as a table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Statistics {
     /// Frames.
     pub frames: u64,
-    /// Error frames that interfaces reported.
+    /// Error frames reported by interfaces.
     pub error_frames: u64,
-    /// Records earlier than one before them.
+    /// Records earlier than a previous one.
     pub backwards: u64,
-    /// Longest time from a record to the next, s.
+    /// Longest time between two records, s.
     pub largest_step_s: f64,
-    /// Furthest that a record is earlier than one before it, s.
+    /// Largest step back in time, s.
     pub largest_step_back_s: f64,
     /// Steps of time that were left out.
     pub skipped_steps: u64,
@@ -238,13 +238,13 @@ pub struct BusStatistics {
     pub interface: String,
     /// Frames.
     pub frames: u64,
-    /// Error frames that it reported.
+    /// Error frames reported by it.
     pub error_frames: u64,
     /// Error frames by class; one of several classes counts in each.
     pub errors: BTreeMap<String, u64>,
     /// From its first record to its last, less what was left out, s.
     pub span_s: f64,
-    /// Share of the time that the bus was taken, of 1.
+    /// Share of the time for which the bus was busy, 0 to 1.
     pub load: f64,
     /// The same in the busiest window of 100 ms.
     pub peak_load: f64,
@@ -261,22 +261,22 @@ pub struct IdStatistics {
     pub name: &'static str,
     /// Frames.
     pub frames: u64,
-    /// Frames a second over the whole trace.
+    /// Frames per second over the whole trace.
     pub rate_hz: f64,
-    /// From one frame to the next; none if there was one frame only.
+    /// From one frame to the next; none with a single frame.
     pub period: Option<PeriodStatistics>,
-    /// Periods more than half as long again as is usual, for a message that comes at a rate.
+    /// Periods more than 1.5 times the usual one, for a periodic message.
     pub gaps: u64,
     /// Frames that never came, by the end-to-end counter.
     pub lost: u64,
-    /// Frames that came twice.
+    /// Frames received twice.
     pub duplicate: u64,
-    /// Frames older than one before them.
+    /// Frames older than a previous one.
     pub stale: u64,
     /// Frames with a wrong end-to-end CRC.
     pub crc: u64,
     /// Frames that fail another check of the protocol.
     pub refused: u64,
-    /// Share of the time that they took the bus, of 1.
+    /// Share of the bus time that they took, 0 to 1.
     pub load: f64,
 }

@@ -1,4 +1,4 @@
-//! Log writer: streaming, with the hash of what it wrote.
+//! Log writer: streaming, with a hash of its output.
 
 use std::io::{self, Write};
 
@@ -9,13 +9,13 @@ use super::{
     Direction, ERROR_FLAG, Entry, ErrorFrame, FLAG_BRS, FLAG_ESI, Interface, LogHash, Record,
 };
 
-/// More than the longest line has: timestamp, interface name, identifier, 64 data bytes, direction.
+/// Longer than any line: timestamp, interface name, identifier, 64 data bytes, direction.
 const CAPACITY: usize = 256;
 
 /// Writes a log of one interface, line by line, and hashes it on the way.
 ///
-/// Two runs wrote the same log exactly if their hashes are equal: that is how a run is proven to be deterministic
-/// without keeping its log. The writer makes one `write_all` a line; give it a buffered sink.
+/// Two runs wrote the same log exactly if their hashes are equal: this proves a run deterministic without keeping its
+/// log. The writer makes one `write_all` per line; give it a buffered sink.
 pub struct Writer<W: Write> {
     sink: W,
     interface: Interface,
@@ -45,7 +45,7 @@ impl<W: Write> Writer<W> {
         })
     }
 
-    /// Appends what a controller reported at `time_us`.
+    /// Appends an error frame reported at `time_us`.
     ///
     /// # Errors
     /// Those of the sink.
@@ -91,7 +91,7 @@ impl<W: Write> Writer<W> {
         self.sink.flush()
     }
 
-    /// Flushes the sink and gives it back with the hash of all that was written.
+    /// Flushes the sink and returns it with the hash of everything written.
     ///
     /// # Errors
     /// Those of the sink.
@@ -161,7 +161,7 @@ impl Line {
         self.len += bytes.len();
     }
 
-    /// Decimal digits, zeros in front up to `width`; a larger number takes what it needs.
+    /// Decimal digits, padded with leading zeros to `width`; a larger number takes as many as it needs.
     fn decimal(&mut self, mut value: u64, width: usize) {
         let mut digits = [b'0'; 20];
         let mut first = digits.len();

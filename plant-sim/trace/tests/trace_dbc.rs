@@ -1,4 +1,4 @@
-//! The DBC holds what the table says, within the limits of the format. Other tools read it in `tests/ci`.
+//! The DBC has the contents of the table, within the limits of the format. Other tools read it in `tests/ci`.
 
 use std::collections::HashSet;
 
@@ -6,7 +6,7 @@ use protocol::schema::Kind;
 use protocol::table::TABLE;
 use trace::dbc;
 
-/// One `SG_` line: name, multiplexor mark, bits of the message it covers.
+/// One `SG_` line: name, multiplexor mark, and the bits of the message that it covers.
 struct Line {
     name: String,
     multiplex: Option<String>,
@@ -98,7 +98,7 @@ fn signals_do_not_overlap() {
     }
 }
 
-/// Every element and every flag of the table is a signal, and nothing else but counter and CRC is.
+/// Every element and flag of the table is a signal, and nothing else except counter and CRC.
 #[test]
 fn every_field_is_there() {
     let text = dbc::generate();
@@ -127,7 +127,7 @@ fn parameters_are_named_where_their_numbers_are() {
     let text = dbc::generate();
     for parameter in protocol::parameters::all() {
         let row = format!("{} {}: ", parameter.rule.number, parameter.name);
-        // Reply and request of the controller, and those of the drives for what is theirs.
+        // Reply and request of the controller, and for parameters of the drives also theirs.
         let expected = match parameter.server() {
             protocol::messages::Server::Controller => 2,
             protocol::messages::Server::Drives => 4,

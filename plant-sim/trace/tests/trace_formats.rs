@@ -1,4 +1,4 @@
-//! Logs in the formats of other tools, what is written read again, and what is asked for of a trace.
+//! Logs in the formats of other tools, reading back what is written, and selections of a trace.
 
 use protocol::frame::{CanFrame, ExtendedId, StandardId};
 use trace::convert::{Converter, Target};
@@ -142,8 +142,8 @@ fn what_candump_prints_on_a_screen_is_read() {
     assert_eq!(log(text), log(same));
     for line in [
         "  can0  123   [2]  AA BB\n",                           // no time
-        " (000.000123)  can0  123   [2]  AA BB\n", // since the frame before, or the start
-        " (2024-07-03 11:46:40.000123)  can0  123   [1]  AA\n", // in a zone that it does not say
+        " (000.000123)  can0  123   [2]  AA BB\n", // since the previous frame, or the start
+        " (2024-07-03 11:46:40.000123)  can0  123   [1]  AA\n", // in an unknown time zone
     ] {
         assert_eq!(read(line.as_bytes()), [Err(Problem::Screen)], "{line}");
     }
@@ -154,7 +154,7 @@ fn what_candump_prints_on_a_screen_is_read() {
     ));
 }
 
-/// A log that was cut off says nothing of its last frame, unless it is all there.
+/// The last frame of a log that was cut off counts only if it is complete.
 #[test]
 fn the_end_of_a_log_that_was_cut_off_is_no_frame() {
     let whole = "(1.000000) can0 123#00\n";
@@ -245,7 +245,7 @@ fn asc_loses_no_microsecond() {
     assert_eq!(times, ["0.000475", "0.100475"]);
 }
 
-/// A section in big-endian order with nanoseconds, as another machine writes it; and one of a link that is not CAN.
+/// A big-endian section with nanoseconds, as written by another machine, and one of a link that is not CAN.
 #[test]
 fn pcapng_of_other_machines_is_read() {
     fn block(kind: u32, body: &[u8]) -> Vec<u8> {

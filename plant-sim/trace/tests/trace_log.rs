@@ -1,4 +1,4 @@
-//! candump logs: what is written is what can-utils writes, and reads back; what is wrong is named.
+//! candump logs: output equals that of can-utils and reads back; errors are named.
 
 use std::io::{self, BufReader, Cursor};
 
@@ -107,7 +107,7 @@ fn lines_are_those_of_can_utils() {
     }
 }
 
-/// Forms that other tools write and we do not.
+/// Forms that only other tools write.
 #[test]
 fn lines_of_other_tools_are_read() {
     let plain = read(b"(0000000001.500000) can0 123#ABCD\n").unwrap();
@@ -220,7 +220,7 @@ fn a_message_names_line_fault_and_what_is_allowed() {
     );
 }
 
-/// A line of 64 KiB costs no memory, and reading goes on behind it. The small buffer makes it span many fills.
+/// A line of 64 KiB costs no memory, and reading continues after it. The small buffer makes it span many fills.
 #[test]
 fn overlong_lines_are_refused_and_skipped() {
     let good = "(1.000000) can0 123#00\n";
@@ -237,7 +237,7 @@ fn overlong_lines_are_refused_and_skipped() {
             problem: Problem::TooLong
         })
     ));
-    // Without an end as well.
+    // Also without an end.
     let endless = vec![b'('; 1 << 16];
     assert_eq!(read_all(&endless), [Err(Problem::TooLong)]);
 }
@@ -253,7 +253,7 @@ fn read_all(bytes: &[u8]) -> Vec<Result<Record, Problem>> {
         .collect()
 }
 
-/// A sink of 64 bytes, a line of more.
+/// A sink of 64 bytes and a longer line.
 #[test]
 fn a_failing_sink_is_reported() {
     let mut writer = Writer::new(Cursor::new([0; 64]), can0());
@@ -327,7 +327,8 @@ proptest! {
         prop_assert_eq!(write(&[a]).1 == write(&[b]).1, a == b);
     }
 
-    /// Every line up to the last gives a record, a problem or is a comment: damage never hides what follows, nor panics.
+    /// Every line up to the last gives a record or a problem or is a comment: damage never hides what follows, and
+    /// never panics.
     #[test]
     fn damaged_bytes_are_confined_to_their_line(
         records in proptest::collection::vec(any_record(), 3),
@@ -342,7 +343,7 @@ proptest! {
         let mut read = read_all(&bytes);
         prop_assert_eq!(read.remove(0), Ok(records[0]));
         prop_assert_eq!(read.pop(), Some(Ok(records[2])));
-        // A comment now, or what follows an error frame on a screen.
+        // Now a comment, or a detail line that follows an error frame on a screen.
         prop_assert!(read.len() == 1 || matches!(byte, b'#' | b'\t'));
     }
 

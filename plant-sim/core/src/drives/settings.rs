@@ -5,14 +5,14 @@ use protocol::time::Period;
 
 use crate::model::DriveTrain;
 
-/// What can be read and set over the bus.
+/// Parameters that can be read and set over the bus.
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
     period: Period,
     rated_torque: [f32; 4],
-    /// Part of its greatest torque that each motor may give.
+    /// Fraction of its peak torque that each motor may give.
     torque_limit: [f32; 4],
-    /// Greatest torques, N m.
+    /// Peak torques, N m.
     greatest_torque: [f64; 4],
     hold_samples: u32,
     /// Torque is off.
@@ -37,12 +37,12 @@ impl Settings {
         }
     }
 
-    /// Samples for which the last command is held when none comes.
+    /// Samples for which the last command is held without a new one.
     pub(super) fn hold_samples(&self) -> u32 {
         self.hold_samples
     }
 
-    /// Motor torques (N m) cut to what they may be.
+    /// Motor torques (N m) cut to their limits.
     pub(super) fn cut(&self, torque: [f32; 4]) -> [f64; 4] {
         std::array::from_fn(|axis| {
             let limit = f64::from(self.torque_limit[axis]) * self.greatest_torque[axis];

@@ -10,7 +10,7 @@ const COARSE: Offset = Offset::new(1e-3, 1e-2);
 /// Offset within which the tool counts as settled.
 const FINE: Offset = Offset::new(1e-5, 1e-4);
 
-/// Result of one cycle. Times are `null` where nothing moved, where the tool did not come that close, and, as the final
+/// Result of one cycle. Times are `null` where nothing moved, where the tool never got that close, and, like the final
 /// error, where the cycle ends in a stop on the path and so has no target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CycleResult {
@@ -26,29 +26,29 @@ pub struct CycleResult {
     pub commanded_s: f64,
     /// Distance from the target at the end of the dwell, mm.
     pub final_error_mm: Option<f64>,
-    /// Yaw away from the target at the end of the dwell, mrad.
+    /// Yaw error from the target at the end of the dwell, mrad.
     pub final_error_mrad: Option<f64>,
 }
 
 /// One cycle while it runs.
 #[derive(Clone, Debug)]
 pub(super) struct Cycle {
-    /// Where the tool is to be in the end: x, y, z, yaw.
+    /// Target of the tool: x, y, z, yaw.
     target: Option<[f64; 4]>,
     /// First sample.
     begun: Option<f64>,
-    /// The sample before the present one.
+    /// The previous sample.
     previous: Option<f64>,
-    /// Last sample at which the reference stood before it first moved.
+    /// Last sample at rest before the reference first moved.
     started: Option<f64>,
     /// Whether the reference moved at the last sample.
     moving: bool,
-    /// First sample at which it stood again.
+    /// First sample at rest again.
     commanded_end: f64,
-    /// First sample from which on the tool stayed within the radius of the target.
+    /// First sample since which the tool has stayed within the radius of the target.
     coarse_since: Option<f64>,
     fine_since: Option<f64>,
-    /// From the target at the last sample.
+    /// Offset from the target at the last sample.
     offset: Option<Offset>,
 }
 
@@ -95,7 +95,7 @@ impl Cycle {
         moving
     }
 
-    /// What it came to; `None` if it had no sample.
+    /// The result; `None` without a sample.
     pub(super) fn result(&self) -> Option<CycleResult> {
         let begun = self.begun?;
         let error = |part: fn(Offset) -> f64| self.offset.map(|offset| part(offset) * 1e3);

@@ -1,10 +1,10 @@
-//! How far a tool is from where it is to be.
+//! Offset of a tool from its target.
 
 use std::f64::consts::TAU;
 
 use crate::maths::{remainder, square};
 
-/// How far a tool is from where it is to be; neither part is negative.
+/// Offset of a tool from its target; neither part is negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Offset {
     /// m.

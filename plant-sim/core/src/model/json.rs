@@ -1,7 +1,7 @@
-//! Reading checked values out of JSON text, with the place of everything that is wrong.
+//! Checked values from JSON text, with the place of every error.
 //!
-//! `serde_json` knows lines only while it parses; a missing key or a mass of zero is noticed later. The reader
-//! therefore keeps the path of every value it hands out and looks its line up when, and only when, it must complain.
+//! `serde_json` knows lines only while parsing; a missing key or a mass of zero is noticed later. The reader therefore
+//! keeps the path of every value it returns, and looks up the line only to report an error.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -19,7 +19,7 @@ enum Segment {
     Index(usize),
 }
 
-/// A value inside a document, together with where it stands.
+/// A value inside a document, with its place.
 #[derive(Clone)]
 pub(super) struct Node<'a> {
     text: &'a str,
@@ -27,8 +27,8 @@ pub(super) struct Node<'a> {
     path: Vec<Segment>,
 }
 
-/// Parses `text`; an error names its place. A key that stands twice in one object is an error: which of the two was meant
-/// cannot be known.
+/// Parses `text`; an error names its place. A duplicate key in an object is an error: there is no way to know which one
+/// was meant.
 pub(super) fn parse(text: &str) -> Result<Value, ModelError> {
     let refused = |error: serde_json::Error| ModelError {
         place: Some((error.line(), error.column())),
@@ -38,7 +38,7 @@ pub(super) fn parse(text: &str) -> Result<Value, ModelError> {
     serde_json::from_str(text).map_err(refused)
 }
 
-/// Any JSON in which no object has a key twice.
+/// Any JSON without duplicate keys.
 struct NoDoubles;
 
 impl<'de> Deserialize<'de> for NoDoubles {
@@ -78,7 +78,7 @@ impl<'de> Visitor<'de> for NoDoubles {
         while let Some(key) = map.next_key::<String>()? {
             if keys.contains(&key) {
                 return Err(A::Error::custom(format!(
-                    "{key} stands twice in one object; allowed: once"
+                    "{key} occurs twice in one object; allowed: once"
                 )));
             }
             keys.insert(key);
@@ -104,7 +104,7 @@ impl<'a> Node<'a> {
             .map(|value| self.child(value, Segment::Key(key.to_owned())))
     }
 
-    /// The value under `key`; `expected` says what belongs there.
+    /// The value under `key`; `expected` describes what belongs there.
     pub(super) fn get(
         &self,
         key: &str,
@@ -159,7 +159,7 @@ impl<'a> Node<'a> {
         self.value.as_str()
     }
 
-    /// Warns of keys that mean nothing here, with the nearest that does.
+    /// Warns of unknown keys, with the nearest known one.
     pub(super) fn warn_of_unknown(&self, known: &[&str], warnings: &mut Vec<String>) {
         for (node, hint) in self.unknown(known) {
             warnings.push(format!(
@@ -170,7 +170,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Refuses keys that mean nothing here.
+    /// Refuses unknown keys.
     pub(super) fn refuse_unknown(&self, known: &[&str]) -> Result<(), ModelError> {
         match self.unknown(known).next() {
             Some((node, hint)) => Err(ModelError {
@@ -228,7 +228,7 @@ impl<'a> Node<'a> {
         node.value.as_str().ok_or_else(|| node.wrong("a string"))
     }
 
-    /// The error that this value is not what it must be.
+    /// The error that this value is not allowed.
     pub(super) fn wrong(&self, expected: impl fmt::Display) -> ModelError {
         let found = match self.value {
             Value::Array(values) => format!("an array of {}", values.len()),
@@ -299,7 +299,7 @@ fn place_of(text: &str, path: &[Segment]) -> (usize, usize) {
     crate::text::place(text, cursor.at)
 }
 
-/// Walks text that is known to be valid JSON.
+/// Walks text known to be valid JSON.
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -316,8 +316,8 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Moves from the start of a container to the start of one of its values. A key that occurs twice means its last
-    /// occurrence, as it does for the parser.
+    /// Moves from the start of a container to the start of one of its values. Of a duplicate key
+    /// the last occurrence counts, as for the parser.
     fn enter(&mut self, segment: &Segment) {
         let keyed = self.peek() == b'{';
         let mut found = self.at;

@@ -1,8 +1,8 @@
 //! From the text of a model or payload file to checked numbers.
 //!
-//! Every number has a range in which the rest of the program keeps its promises: what travels in a frame fits the frame,
-//! a mass matrix is positive definite, a position fits the 32 bits of an encoder. The ranges are wide; what is outside
-//! them is another unit or a slip of the pen, and the message says which.
+//! Every number has a range in which the rest of the program works as specified: values in frames fit the frame, mass
+//! matrices are positive definite, positions fit the 32 bits of an encoder. The ranges are wide; a number outside them
+//! is in another unit or a typing error, and the message says which.
 
 mod drive;
 
@@ -14,13 +14,13 @@ use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_
 use crate::maths::hypot;
 use crate::text::Source;
 
-/// Tolerance within which a derived or an implied number repeats another one: model files carry rounded decimals.
+/// Tolerance for a derived or implied number to agree with another one: model files carry rounded decimals.
 const SAME: f64 = 1e-9;
 
 const LENGTH: Allowed = Allowed::above_zero(10.0, "m");
 const COORDINATE: Allowed = Allowed::within(-10.0, 10.0, "m");
 const LINK_MASS: Allowed = Allowed::above_zero(1000.0, "kg");
-/// Not zero: a shaft without inertia would make the mass matrix singular.
+/// Not zero: without inertia of the shaft the mass matrix would be singular.
 const LINK_INERTIA: Allowed = Allowed::above_zero(1000.0, "kg m2");
 /// About three turns either way.
 const ANGLE: Allowed = Allowed::within(-20.0, 20.0, "rad");
@@ -29,7 +29,7 @@ const SPEED: Allowed = Allowed::above_zero(100.0, "m/s");
 const ANY_POSITIVE: Allowed = Allowed::above_zero(1e9, "");
 const ANY_NOT_NEGATIVE: Allowed = Allowed::within(0.0, 1e9, "");
 
-/// Keys that mean something, and those that other programs put into the same file.
+/// Known keys, including those that other programs put into the same file.
 const ROOT: &[&str] = &[
     "name",
     "units",
@@ -133,7 +133,7 @@ pub(super) fn payload(text: &str) -> Result<Payload, ModelError> {
 fn units(root: &Node<'_>) -> Result<(), ModelError> {
     match root.optional("units") {
         Some(units) if !units.as_str().is_some_and(|text| text.starts_with("SI")) => {
-            Err(units.wrong("\"SI: m, kg, s, rad, N, N m\", which is what every number is read in"))
+            Err(units.wrong("\"SI: m, kg, s, rad, N, N m\", in which every number is read"))
         }
         _ => Ok(()),
     }
@@ -142,7 +142,7 @@ fn units(root: &Node<'_>) -> Result<(), ModelError> {
 fn gravity(root: &Node<'_>) -> Result<f64, ModelError> {
     let [x, y, z] = root.numbers("gravity", Allowed::within(-100.0, 100.0, "m/s2"))?;
     if x != 0.0 || y != 0.0 {
-        // The lift would no longer be the only axis that carries weight: nothing here is made for that.
+        // The lift would no longer be the only axis that carries weight, which nothing here supports.
         return Err(root.get("gravity", "")?.wrong("vertical: [0, 0, z]"));
     }
     Ok(-z)
@@ -211,7 +211,7 @@ fn limits(node: &Node<'_>, warnings: &mut Vec<String>) -> Result<JointLimits, Mo
     Ok(limits)
 }
 
-/// Compares the elements of the array `key` with others; the first that is `wrong` is named.
+/// Compares the elements of the array `key` with others; the error names the first that is `wrong`.
 fn each(
     node: &Node<'_>,
     key: &str,
@@ -259,7 +259,7 @@ fn links(
     Ok(links)
 }
 
-/// Links have no keys of their own: a name that carries a number says which one the author meant.
+/// Links are identified by their order alone: a number in a name shows which one the author meant.
 fn check_order(node: &Node<'_>, index: usize) -> Result<(), ModelError> {
     let Some(name) = node.optional("name") else {
         return Ok(());
@@ -272,7 +272,7 @@ fn check_order(node: &Node<'_>, index: usize) -> Result<(), ModelError> {
         .collect();
     match digits.parse::<usize>() {
         Ok(number) if (1..=4).contains(&number) && number != index + 1 => Err(name.wrong(format!(
-            "a link {} here: links stand in the order arm 1, arm 2, carriage, shaft",
+            "a link {} here: the order of links is arm 1, arm 2, carriage, shaft",
             index + 1
         ))),
         _ => Ok(()),

@@ -1,4 +1,4 @@
-//! A scenario as a list of things to do.
+//! A scenario as a list of actions.
 
 use protocol::messages::{Mode, MotionRequest};
 use protocol::time::Duration;
@@ -6,10 +6,10 @@ use protocol::time::Duration;
 use super::CellEvent;
 use crate::scenario::{PayloadSpec, Scenario, Step};
 
-/// Wait after enabling, until brake and observer have come to rest.
+/// Wait after enabling, until brake and observer have settled.
 const SETTLING: Duration = Duration::from_millis(100);
 
-/// One thing to do.
+/// One action.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Action {
     Hello,
@@ -20,7 +20,7 @@ pub(super) enum Action {
     Cell(CellEvent),
 }
 
-/// Everything to do, in order.
+/// All actions, in order.
 pub(super) fn program(scenario: &Scenario) -> Vec<Action> {
     let announce = |payload: &PayloadSpec| {
         Action::Request(MotionRequest::SetPayload {
@@ -38,7 +38,7 @@ pub(super) fn program(scenario: &Scenario) -> Vec<Action> {
     let mut actions = vec![
         Action::Hello,
         Action::WaitMode(Mode::Ready),
-        // The first request of an operator might be a replay and cannot switch anything on.
+        // The controller treats an operator's first request as a possible replay, which cannot switch anything on.
         Action::Request(MotionRequest::Stop),
         Action::Request(MotionRequest::SelectLaw {
             law: scenario.law.law,

@@ -9,7 +9,7 @@ use crate::maths::sin_cos;
 use crate::model::{Payload, RobotModel};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
-/// A serial chain of four rigid links with one joint each, and what is held at its flange.
+/// A serial chain of four rigid links with one joint each, and the payload at its flange.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
     /// From the parent link's frame to the joint's frame at joint position zero.
@@ -150,7 +150,7 @@ impl Arm {
         self.inverse_dynamics(at, qd, &Vector4::zeros())
     }
 
-    /// `g`: the efforts that hold the arm still.
+    /// `g`: the efforts that hold the arm at rest.
     pub fn gravity(&self, at: &Configuration) -> Vector4<f64> {
         self.bias(at, &Vector4::zeros())
     }

@@ -1,7 +1,7 @@
-//! Holding brake of the lift, closed by a spring when it has no current.
+//! Holding brake of the lift, closed by a spring when not energised.
 //!
 //! Dry friction with true sticking (Karnopp 1985): a closed brake at rest is a constraint, not a stiff law, so that a
-//! braked lift neither creeps nor needs small steps. It slips only while the effort on it exceeds what it holds.
+//! braked lift neither creeps nor needs small steps. It slips only while the effort on it exceeds its capacity.
 
 use super::friction::{coulomb, coulomb_secant};
 
@@ -28,8 +28,8 @@ impl Brake {
     /// From the command to the open brake, ns.
     pub const RELEASE_NS: u64 = 50_000_000;
 
-    /// Force held, in terms of the peak effort of the axis: a motor gone wild must not push through, even downwards
-    /// with a heavy payload.
+    /// Force held, relative to the peak effort of the axis: a runaway motor must not overcome it, even downwards with a
+    /// heavy payload.
     const MARGIN: f64 = 1.5;
     /// Slower than this (m/s) a slipping brake grips; also the speed over which sliding friction builds up.
     const GRIP_SPEED: f64 = 1e-3;
@@ -59,12 +59,12 @@ impl Brake {
         }
     }
 
-    /// When the mechanism will next move, ns.
+    /// Time of the mechanism's next change, ns.
     pub fn due(&self) -> Option<u64> {
         self.due
     }
 
-    /// Moves the mechanism if it is time to.
+    /// Changes the mechanism if that is due.
     pub fn update(&mut self, now: u64) {
         if self.due.is_some_and(|due| due <= now) {
             self.due = None;
@@ -88,12 +88,12 @@ impl Brake {
         self.capacity
     }
 
-    /// The brake under an effort (N) while sticking: lets go beyond its capacity.
+    /// Loads a sticking brake with an effort (N): it slips beyond its capacity.
     pub(super) fn load(&mut self, effort: f64) {
         self.sticking &= effort.abs() <= self.capacity;
     }
 
-    /// The brake at speed `speed` (m/s): grips, when nearly at rest. Returns whether it grips now and did not before.
+    /// Lets a slipping brake grip when nearly at rest, at `speed` (m/s). Returns whether it has just gripped.
     pub(super) fn grip(&mut self, speed: f64) -> bool {
         let grips = self.closed && !self.sticking && speed.abs() < Self::GRIP_SPEED;
         self.sticking |= grips;

@@ -9,7 +9,7 @@ use crate::model::DriveTrain;
 use nalgebra::{Matrix4, Vector4};
 use std::f64::consts::TAU;
 
-/// The four motors with what connects them to the joints.
+/// The four motors with their transmissions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drive {
     train: DriveTrain,
@@ -18,9 +18,10 @@ pub struct Drive {
     rotor_inertia: Matrix4<f64>,
 }
 
-/// Above its speed limit a motor's torque falls to zero over this part of the limit. The voltage that is left decides
-/// that on a real drive; below the limit the published torque is always available. An estimate that only a run beyond the
-/// speed limit feels: a step instead of a slope would make the integration depend on where its steps lie.
+/// Above its speed limit a motor's torque falls to zero over this fraction of the limit. On a real drive that depends
+/// on the remaining voltage; below the limit the published torque is always available. An estimate that only
+/// affects runs beyond the speed limit: a jump instead of a slope would make the integration depend on where its steps
+/// fall.
 const SPEED_TAPER: f64 = 0.05;
 
 impl Drive {
@@ -62,17 +63,17 @@ impl Drive {
         self.coupling_inverse * phi
     }
 
-    /// Efforts that the motor torques (N m) bring to the joints.
+    /// Joint efforts of the motor torques (N m).
     pub fn joint_effort(&self, motor_torque: &Vector4<f64>) -> Vector4<f64> {
         self.coupling.tr_mul(motor_torque)
     }
 
-    /// Motor torques (N m) that bring these efforts to the joints.
+    /// Motor torques (N m) for these joint efforts.
     pub fn motor_torque(&self, joint_effort: &Vector4<f64>) -> Vector4<f64> {
         self.coupling_inverse.tr_mul(joint_effort)
     }
 
-    /// `A^T J A`: what the rotors add to the mass matrix.
+    /// `A^T J A`: contribution of the rotors to the mass matrix.
     pub fn rotor_inertia(&self) -> &Matrix4<f64> {
         &self.rotor_inertia
     }
@@ -85,7 +86,7 @@ impl Drive {
         })
     }
 
-    /// Friction divided by speed, which is positive also at rest.
+    /// Friction divided by speed, positive even at rest.
     pub fn friction_secant(&self, qd: &Vector4<f64>) -> Vector4<f64> {
         let train = &self.train;
         Vector4::from_fn(|i, _| {
@@ -107,7 +108,7 @@ impl Drive {
         }
     }
 
-    /// The torques (N m) that the motors give when asked for `request` at motor speeds `speed` (rad/s).
+    /// The torques (N m) that the motors give for the command `request` at motor speeds `speed` (rad/s).
     pub fn limited(&self, request: &Vector4<f64>, speed: &Vector4<f64>) -> Vector4<f64> {
         Vector4::from_fn(|i, _| {
             let (least, greatest) = self.torque_bounds(i, speed[i]);

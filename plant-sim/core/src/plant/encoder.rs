@@ -18,7 +18,8 @@ impl Encoder {
 
     /// Reading at a motor angle (rad): the nearest count, so off by half a count at most.
     ///
-    /// The reading is a 32-bit register, which wraps; at 17 bits a turn that is after 16384 turns in each direction.
+    /// The reading is a 32-bit register, which wraps; at 17 bits per turn that is after 16384 turns in each
+    /// direction.
     pub fn counts(&self, angle: f64) -> i32 {
         (angle / TAU * self.counts_per_turn).round() as i64 as i32
     }

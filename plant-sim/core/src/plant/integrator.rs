@@ -1,14 +1,14 @@
 //! One step in time of `M(q) qdd = effort(q, qd)` with stiff friction.
 //!
-//! Coulomb friction that builds up over 0.001 m/s on a 10 kg lift is a damper of 2000 1/s, and a model file may ask for
-//! far more, so an explicit method would let the robot's friction choose the step. The step here is linearly implicit
-//! in the friction alone: ROS34PW2 of Rang and Angermann (BIT 45, 2005), four stages, order 3, L-stable. It is a
-//! W-method: it keeps its order with any approximate Jacobian, which is what allows two liberties.
+//! Coulomb friction that builds up over 0.001 m/s on a 10 kg lift is a damper of 2000 1/s, and a model file may
+//! have far more, so with an explicit method the robot's friction would dictate the step. The step here is linearly
+//! implicit in the friction alone: ROS34PW2 of Rang and Angermann (BIT 45, 2005), four stages, order 3, L-stable. It is
+//! a W-method: it keeps its order with any approximate Jacobian, which allows two simplifications.
 //!
 //! * Only the joint damping D enters the Jacobian: `-M^-1 D` in the velocity block, zero elsewhere.
 //! * D is the secant of the friction law, friction / speed, not its tangent. The tangent vanishes at speed; a step
-//!   that crosses zero would then overshoot, turn, and chatter without end. The secant of a saturating law is never below
-//!   its tangent, and for a Jacobian of 0.8 times the true one and upwards the method damps at any step size.
+//!   that crosses zero would then overshoot, turn, and chatter without end. The secant of a saturating law is never
+//!   below its tangent, and with at least 0.8 times the true Jacobian the method is damped at any step size.
 //!
 //! With D = 0 this is an explicit Runge-Kutta method of order 3.
 
@@ -16,14 +16,14 @@ use nalgebra::{Matrix4, SVector, Vector4};
 
 /// Diagonal coefficient.
 const GAMMA: f64 = 0.435_866_521_508_459;
-/// Where the stages stand.
+/// Nodes of the stages.
 const ALPHA: [[f64; 3]; 4] = [
     [0.0, 0.0, 0.0],
     [0.871_733_043_016_918, 0.0, 0.0],
     [0.844_570_600_153_694_2, -0.112_990_642_364_841_85, 0.0],
     [0.0, 0.0, 1.0],
 ];
-/// What each stage takes from the Jacobian times earlier stages.
+/// Coefficients of the Jacobian times earlier stages.
 const GAMMAS: [[f64; 3]; 4] = [
     [0.0, 0.0, 0.0],
     [-0.871_733_043_016_918, 0.0, 0.0],
@@ -42,7 +42,7 @@ const WEIGHTS: [f64; 4] = [
     GAMMA,
 ];
 
-/// Rates of what is integrated along with the motion: four motor torques, motor power, lost power.
+/// Rates of the quantities integrated along with the motion: four motor torques, motor power, lost power.
 pub(super) type Rates = SVector<f64, 6>;
 
 /// Advances `q` and `qd` by `h` seconds and returns the integrals of the rates.

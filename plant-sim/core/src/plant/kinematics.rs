@@ -1,4 +1,4 @@
-//! Where the flange is, how it moves, and which joint positions bring it somewhere.
+//! Kinematics of the flange: pose, velocity, and inverse kinematics.
 
 use super::arm::{Arm, Configuration};
 use super::spatial::{Motion, Transform};
@@ -7,7 +7,7 @@ use crate::model::{Geometry, JointLimits};
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector4, Vector6};
 use std::f64::consts::{PI, TAU};
 
-/// Place of the flange that a SCARA can choose: the rest of the orientation is always "pointing down".
+/// Pose of the flange in the coordinates that a SCARA can move; it always points down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// m, frame 0.
@@ -20,12 +20,12 @@ pub struct Pose {
     pub yaw: f64,
 }
 
-/// What is outside the limits in an otherwise possible solution.
+/// The violated limit of an otherwise possible solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Violation {
     /// The elbow folds or stretches too far.
     Elbow,
-    /// Axis 1 would pass its stop.
+    /// Axis 1 would exceed its limit.
     Shoulder,
     /// The target is above the retracted shaft.
     TooHigh,
@@ -44,12 +44,12 @@ pub struct Solution {
     pub violation: Option<Violation>,
 }
 
-/// Both arms' lengths together do not allow the radius.
+/// Radius that the arm lengths do not allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unreachable {
-    /// Further out than the stretched arm.
+    /// Beyond the stretched arm.
     TooFar,
-    /// Nearer than the folded arm.
+    /// Inside the folded arm.
     InsideHole,
 }
 
@@ -92,7 +92,7 @@ impl Arm {
             velocity = velocity + *axis * speed;
             acceleration = acceleration + velocity.cross(axis) * speed;
         }
-        // Spatial acceleration is that of the stream of points through a fixed place; the flange moves along.
+        // Spatial acceleration belongs to the stream of points through a fixed place, but the flange moves along.
         acceleration.linear += velocity.angular.cross(&velocity.linear);
         rows(&acceleration)
     }
@@ -149,7 +149,7 @@ fn violation(limits: &JointLimits, q: &Vector4<f64>) -> Option<Violation> {
     let within = |axis: usize, value: f64| {
         (limits.lower[axis] - TOLERANCE..=limits.upper[axis] + TOLERANCE).contains(&value)
     };
-    // The smallest turn that is not below the lower limit is the only one to look at.
+    // Only the smallest turn not below the lower limit needs checking.
     let some_turn_within = |axis: usize| {
         let turns = ((limits.lower[axis] - TOLERANCE - q[axis]) / TAU).ceil();
         within(axis, q[axis] + TAU * turns)

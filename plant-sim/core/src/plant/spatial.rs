@@ -28,7 +28,7 @@ pub struct Force {
 /// Change of coordinates from frame A to frame B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform {
-    /// Turns coordinates of A into coordinates of B.
+    /// Maps coordinates of A to coordinates of B.
     pub rotation: Matrix3<f64>,
     /// Origin of B in coordinates of A, m.
     pub origin: Vector3<f64>,

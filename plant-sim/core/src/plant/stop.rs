@@ -14,10 +14,10 @@ pub struct EndStops {
 }
 
 /// Angular frequency of a joint on its stop, rad/s. An axis that arrives at speed v compresses its stop by less than
-/// v / RATE (1 degree on axis 1 at full speed, 6 mm on the lift), slow enough for the integrator to resolve.
+/// v / RATE (1 degree on axis 1 at full speed, 6 mm on the lift); slow enough for the integrator to resolve.
 const RATE: f64 = 400.0;
 
-/// Damping ratio on the stop: an axis leaves it with three tenths of the speed of its arrival.
+/// Damping ratio on the stop: an axis leaves it with three tenths of its arrival speed.
 const DAMPING_RATIO: f64 = 0.5;
 
 impl EndStops {
@@ -61,7 +61,7 @@ impl EndStops {
             .sum()
     }
 
-    /// How far joint `i` is beyond a limit: positive beyond the upper, negative beyond the lower, else 0.
+    /// How far joint `i` is beyond a limit: positive beyond the upper, negative beyond the lower, otherwise 0.
     fn depth(&self, q: &Vector4<f64>, i: usize) -> f64 {
         (q[i] - self.upper[i]).max(0.0) + (q[i] - self.lower[i]).min(0.0)
     }

@@ -1,4 +1,4 @@
-//! What a scenario has to keep before anything runs: ranges, and that the hand is not asked for what it cannot do.
+//! Checks of a scenario before anything runs: ranges, and that the gripper can do what it has to.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use crate::model::RobotModel;
 use crate::text;
 
 const LENGTH: Allowed = Allowed::within(-10.0, 10.0, "m");
-/// Two turns either way; what the wrist of a robot reaches is checked with the robot.
+/// Two turns either way; the range of the wrist is checked with the robot.
 const YAW: Allowed = Allowed::within(-2.0 * TAU, 2.0 * TAU, "rad");
 const JOINT: Allowed = Allowed::within(-20.0, 20.0, "rad");
 const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
@@ -20,7 +20,7 @@ const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
 const FACTOR: Allowed = Allowed::within(0.0, 10.0, "");
 
 impl Scenario {
-    /// Everything that can be judged without a robot.
+    /// Checks everything that does not depend on the robot.
     pub(super) fn check(&self) -> Result<(), ScenarioError> {
         if !(1..=MAX_CYCLES).contains(&self.cycles) {
             return Err(self.wrong("cycles", self.cycles, format!("1 to {MAX_CYCLES}")));
@@ -41,8 +41,8 @@ impl Scenario {
         Ok(())
     }
 
-    /// What depends on the robot that the controller knows: payloads it may carry, gains its rate allows, a hand that is
-    /// free when it takes and full when it lets go.
+    /// Checks what depends on the nominal robot: payloads that it may carry, gains that the rate allows, a gripper that
+    /// is empty before a pick and full before a place.
     ///
     /// # Errors
     /// See [`ScenarioError`].
@@ -70,7 +70,7 @@ impl Scenario {
         if let Some(payload) = held {
             self.number("payload.mass", payload.mass, carry)?;
         }
-        // What the hand holds at the end of a cycle it holds at the beginning of the next.
+        // The gripper begins a cycle with whatever it held at the end of the previous one.
         for _ in 0..self.cycles.min(2) {
             for (index, step) in self.cycle.iter().enumerate() {
                 match step {
@@ -92,7 +92,7 @@ impl Scenario {
                         return Err(self.wrong(
                             &format!("cycle[{index}].place"),
                             "nothing",
-                            "a gripper that holds something: pick it first",
+                            "a gripper that holds something: pick first",
                         ));
                     }
                     _ => {}
@@ -185,8 +185,8 @@ impl Scenario {
     }
 }
 
-/// Line and column of the value under a key such as `cycle[2].jump.to[0]`, if it is in the text: a default is not,
-/// nor is what the command line says.
+/// Line and column of the value under a key such as `cycle[2].jump.to[0]`, if it is in the text;
+/// defaults and command-line values are not.
 fn place(toml: &str, key: &str) -> Option<(usize, usize)> {
     let document = DeTable::parse(toml).ok()?;
     let mut at = document.span();

@@ -1,4 +1,4 @@
-//! What was run, and all that it takes to run it again.
+//! What was run, with everything needed to run it again.
 
 use firmware::control::laws::Gains;
 use serde::Serialize;
@@ -10,12 +10,12 @@ use crate::scenario::{GainsSpec, Mismatch, PayloadSpec};
 use crate::setup::RunConfig;
 
 /// What was run. With the same version of the program, `scenario_text` and the two models give the same trace and the
-/// same truth, to the byte; the rest is in them and stands here to be read.
+/// same truth, to the byte; the rest repeats parts of them for readers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Recipe {
     /// Name of the scenario.
     pub scenario: String,
-    /// The scenario as it was run, with all that the command line has changed: the text of a scenario file.
+    /// The scenario as it was run, including changes from the command line, as the text of a scenario file.
     pub scenario_text: String,
     /// Law and compensation.
     pub law: String,
@@ -25,24 +25,24 @@ pub struct Recipe {
     pub gains: GainsSpec,
     /// Mass of the payload at the start.
     pub payload_kg: f64,
-    /// What the flange carries from the start, as the controller is told.
+    /// Payload at the flange from the start, as announced to the controller.
     pub payload: Option<PayloadSpec>,
-    /// True value over the value that the controller believes.
+    /// Mismatch: actual value over nominal value.
     pub mismatch: Mismatch,
-    /// The robot twice: as it is believed to be, and as it is.
+    /// The robot twice: nominal and actual.
     pub models: Models,
 }
 
 /// The two robots of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Models {
-    /// The one that the controller believes in.
+    /// The nominal one, of the controller.
     pub controller: Model,
-    /// The one that moves, before the mismatch.
+    /// The actual one, before the mismatch.
     pub robot: Model,
 }
 
-/// A robot, and where its numbers are from.
+/// A robot, and the origin of its numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Model {
     /// Name in the model file.

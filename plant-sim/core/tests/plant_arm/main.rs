@@ -15,11 +15,11 @@ use sim::plant::arm::Arm;
 use sim::plant::kinematics::{self, Pose, wrap};
 use std::f64::consts::PI;
 
-/// Holds the arm against the oracle at one state.
+/// Compares the arm with the oracle at one state.
 ///
 /// `scale` of an effort is the sum of the magnitudes that go into it. The oracle and the plant each add fewer than 100
 /// products, so exact formulas agree within 200 eps; central differences of trigonometric polynomials of first degree
-/// err by h^2 / 6 of the amplitude, plus 4 eps / h from cancellation.
+/// have an error of h^2 / 6 of the amplitude, plus 4 eps / h from cancellation.
 fn check(
     model: &RobotModel,
     payload: &Payload,
@@ -31,7 +31,7 @@ fn check(
     let at = arm.at(q);
     let exact = 200.0 * f64::EPSILON;
     let mass = arm.mass_matrix(&at);
-    // Lengths enter squared; the model's vertical offsets cancel in M only after they were added.
+    // Lengths enter squared; the model's vertical offsets cancel in M only after being added.
     let mass_scale = size(&oracle);
     let error = (mass - oracle.mass_matrix(q)).amax();
     assert!(error <= exact * mass_scale, "M is off by {error:e}");
@@ -60,7 +60,7 @@ fn check(
     assert!(
         (tau - mass * qdd - bias).amax() <= exact * 4.0 * (mass_scale * qdd.amax() + bias_scale)
     );
-    // Forward dynamics is compared by the efforts, where an error is not magnified by the condition of M.
+    // Forward dynamics is compared by efforts, which do not magnify the error by the condition of M.
     let residual = (mass * (oracle.forward_dynamics(q, qd, &tau) - qdd)).amax();
     let condition = mass_scale / mass.symmetric_eigenvalues().min();
     assert!(
@@ -159,8 +159,8 @@ proptest! {
         let pose = arm.pose(&arm.at(&q));
         let solutions = kinematics::inverse(&model.geometry, &model.limits, &pose).unwrap();
         let same = &solutions[usize::from(q[1] < 0.0)].q;
-        // theta2 follows the radius with a slope r / (a1 a2 sin theta2), and theta1 follows theta2; with two arms of
-        // nearly one length the shoulder's own direction is ill-conditioned as 1 / r.
+        // theta2 follows the radius with a slope r / (a1 a2 sin theta2), and theta1 follows theta2; with arms of
+        // nearly equal length the shoulder's direction is ill-conditioned as 1 / r.
         let (a1, a2) = (model.geometry.a1, model.geometry.a2);
         let slope = (a1 + a2) * (a1 + a2) / (a1 * a2 * q[1].sin().abs()) + 1.0 / pose.x.hypot(pose.y);
         for i in [0, 1, 3] {
@@ -180,7 +180,7 @@ proptest! {
 fn a_limited_wrist_may_use_another_turn() {
     let mut model = RobotModel::irb_930_22_105();
     (model.limits.lower[3], model.limits.upper[3]) = (PI, 2.0 * PI);
-    // theta1 + theta2 - yaw = -1 is out of reach as it stands, and within reach one turn on.
+    // theta1 + theta2 - yaw = -1 is out of range, and within range one turn on.
     let arm = Arm::new(&model, None);
     let pose = arm.pose(&arm.at(&Vector4::new(0.3, 1.0, 0.1, -1.0)));
     let reach = |pose: &Pose| {

@@ -8,7 +8,7 @@ use sim::model::{Payload, RobotModel};
 /// Three rows of a Jacobian.
 type Half = SMatrix<f64, 3, 4>;
 
-/// A body as the oracle wants it: centre of mass and principal moments in the DH frame of the link that carries it.
+/// A body for the oracle: centre of mass and principal moments in the DH frame of the link that carries it.
 pub(crate) struct Body {
     link: usize,
     pub(crate) mass: f64,

@@ -1,5 +1,5 @@
-//! Vector ASC: the text log of CANalyzer and CANoe. Times count from the date in the header, which is that of the first
-//! record in local time, as its readers take it, and in whole milliseconds: the first time holds the rest.
+//! Vector ASC: the text log of CANalyzer and CANoe. Times count from the date in the header. That is the date of the
+//! first record in local time, as readers expect it, in whole milliseconds: the first time holds the rest.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -42,7 +42,7 @@ impl<W: Write> Asc<W> {
                 start_us
             }
         };
-        // Channels are counted from 1. A clock that was set back before the start stays at the start.
+        // Channels are counted from 1. A clock set back to before the start stays at the start.
         let channel = self.interfaces.number(record.interface).0 + 1;
         let time = Seconds(record.time_us.saturating_sub(start_us)).to_string();
         let content = match &record.entry {
@@ -106,7 +106,7 @@ fn frame_line(channel: usize, direction: Option<Direction>, frame: &CanFrame) ->
     line
 }
 
-/// Local time of a time since 1970; one that no calendar has is taken for its start.
+/// Local time of a time since 1970; one beyond the calendar becomes its start.
 fn local(time_us: u64) -> DateTime<Local> {
     let time = i64::try_from(time_us)
         .ok()
@@ -124,7 +124,7 @@ mod tests {
     use super::date;
     use chrono::DateTime;
 
-    /// Values of GNU date: `date -u -d @SECONDS`.
+    /// Values from GNU date: `date -u -d @SECONDS`.
     #[test]
     fn dates_are_those_of_the_calendar() {
         let utc = |time_us| date(&DateTime::from_timestamp_micros(time_us).unwrap());

@@ -11,7 +11,7 @@ pub(crate) const SECTION_HEADER: u32 = 0x0A0D_0D0A;
 pub(crate) const INTERFACE_DESCRIPTION: u32 = 1;
 pub(crate) const ENHANCED_PACKET: u32 = 6;
 pub(crate) const BYTE_ORDER_MAGIC: u32 = 0x1A2B_3C4D;
-/// Of a section that is written as it comes.
+/// Length of a section that is written as a stream.
 const UNKNOWN_LENGTH: u64 = u64::MAX;
 pub(crate) const LINKTYPE_CAN_SOCKETCAN: u16 = 227;
 /// Option of an interface: its name.
@@ -24,7 +24,7 @@ pub(crate) const DIRECTION_OUT: u32 = 2;
 pub(crate) const EXTENDED_FLAG: u32 = 0x8000_0000;
 pub(crate) const REMOTE_FLAG: u32 = 0x4000_0000;
 
-/// A pcapng file of one section. Timestamps count microseconds, the resolution of the format unless told otherwise.
+/// A pcapng file of one section. Timestamps count microseconds, the default resolution of the format.
 pub(super) struct Pcapng<W> {
     pub(super) sink: W,
     interfaces: Interfaces,
@@ -91,7 +91,7 @@ impl<W: Write> Pcapng<W> {
         let name = interface.to_string();
         self.put(LINKTYPE_CAN_SOCKETCAN.to_le_bytes());
         self.put(0_u16.to_le_bytes());
-        // No limit to the length of packets.
+        // No limit on the length of packets.
         self.put(0_u32.to_le_bytes());
         self.put(IF_NAME.to_le_bytes());
         self.put((name.len() as u16).to_le_bytes());
@@ -132,7 +132,7 @@ fn frame_packet(frame: &CanFrame) -> Vec<u8> {
         FrameKind::Classical { remote: false } => {
             packet(id, frame.data().len() as u8, 0, frame.data())
         }
-        // Carries no data, but tells the length asked for.
+        // Carries no data, only the requested length.
         FrameKind::Classical { remote: true } => packet(id | REMOTE_FLAG, frame.dlc(), 0, &[]),
         FrameKind::Fd { brs, esi } => {
             let flags = FLAG_FDF | (u8::from(brs) * FLAG_BRS) | (u8::from(esi) * FLAG_ESI);

@@ -6,23 +6,23 @@ use protocol::frame::{CLASSICAL_MAX, CanFrame, FD_MAX, fd_length_of_dlc};
 use crate::line::{Problem, fd, id, timestamp};
 use crate::{Direction, Entry, ErrorFrame, Interface, Record};
 
-/// What stands for an error frame, of which ASC says no more (`CAN_ERR_BUSERROR`, as can-utils has it).
+/// Class for an error frame, of which ASC gives no details (`CAN_ERR_BUSERROR`, as in can-utils).
 const BUS_ERROR: u32 = 0x80;
 
 /// State between two lines.
 #[derive(Default)]
 pub(super) struct Asc {
     decimal: bool,
-    /// Times count from the line before instead of from the start.
+    /// Whether times count from the previous line instead of the start.
     relative: bool,
-    /// Since 1970.
+    /// Start time since 1970.
     start_us: u64,
-    /// Time of the line before, from the start.
+    /// Time of the previous line, from the start.
     now_us: u64,
 }
 
 impl Asc {
-    /// Whether a file that begins so is ASC.
+    /// Whether a file that begins with this line is ASC.
     pub(super) fn begins(line: &[u8]) -> bool {
         line.starts_with(b"date ") || line.starts_with(b"base ")
     }
@@ -33,7 +33,7 @@ impl Asc {
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
         match words.as_slice() {
             ["date", date @ ..] => {
-                // A date in a language that is not known leaves times from the start.
+                // With a date in an unknown language, times count from the start.
                 self.start_us = date_us(date).unwrap_or(0);
                 None
             }
@@ -87,10 +87,10 @@ impl Asc {
             _ => return None,
         };
         let direction = match *way {
-            // Also what is written where the direction is not known.
+            // Also written where the direction is unknown.
             "Rx" => None,
             "Tx" => Some(Direction::Transmitted),
-            // A request to send (TxRq), of which the frame itself follows, and statistics.
+            // A request to send (TxRq), followed by the frame itself, and statistics.
             _ => return None,
         };
         let frame = if fd {
@@ -110,7 +110,7 @@ impl Asc {
         };
         match rest {
             ["r", rest @ ..] => {
-                // python-can and old files leave the length out; what follows then is no number.
+                // python-can and old files omit the length; what follows then is not a number.
                 let len = dlc(rest.first()).unwrap_or(0);
                 CanFrame::remote(id, len.min(CLASSICAL_MAX)).ok_or(Problem::Remote)
             }
@@ -126,7 +126,7 @@ impl Asc {
 
     fn fd(&self, id: &str, rest: &[&str]) -> Result<CanFrame, Problem> {
         let id = self.id(id)?;
-        // A symbolic name may stand before the flags.
+        // A symbolic name may precede the flags.
         let rest = match rest {
             ["0" | "1", ..] => rest,
             [_, rest @ ..] => rest,
@@ -139,7 +139,7 @@ impl Asc {
         let len: usize = len.parse().map_err(|_| Problem::Asc("no length"))?;
         let mut buffer = [0; FD_MAX];
         let data = self.data(rest, len, &mut buffer)?;
-        // The last words of the line: flags of the frame say whether it is FD.
+        // Among the last words of the line, the flags show whether the frame is FD.
         let flags = rest
             .get(len + 2)
             .and_then(|flags| u32::from_str_radix(flags, 16).ok());
@@ -184,7 +184,7 @@ impl Asc {
             .ok_or(Problem::Asc("too many bytes"))?;
         for (byte, word) in data.iter_mut().zip(words) {
             *byte = u8::from_str_radix(word, self.radix())
-                .map_err(|_| Problem::Asc("data that is no byte"))?;
+                .map_err(|_| Problem::Asc("data that is not a byte"))?;
         }
         Ok(data)
     }

@@ -19,7 +19,7 @@ const IF_TSRESOL: u16 = 9;
 const IF_TSOFFSET: u16 = 14;
 /// CAN XL mark in the byte of the FD flags.
 const XL_FLAG: u8 = 0x80;
-/// Longest block that is believed; a packet of CAN has fewer than 200 bytes.
+/// Longest plausible block; a packet of CAN has fewer than 200 bytes.
 const MAX_BLOCK: usize = 1 << 20;
 /// Most interfaces; a machine has fewer.
 const MAX_INTERFACES: usize = 1 << 12;
@@ -52,7 +52,7 @@ pub(super) struct Pcapng {
 struct Described {
     name: Interface,
     link_type: u16,
-    /// Ticks a second.
+    /// Ticks per second.
     resolution: u64,
     offset_s: i64,
 }
@@ -90,7 +90,7 @@ impl Pcapng {
         }
     }
 
-    /// Reads a block; its body is in `block` then.
+    /// Reads a block; its body is left in `block`.
     fn next_block(&mut self, source: &mut impl BufRead) -> io::Result<Option<u32>> {
         if source.fill_buf()?.is_empty() {
             return Ok(None);
@@ -170,7 +170,7 @@ impl Pcapng {
                     let name = name.split(|&byte| byte == 0).next().unwrap_or_default();
                     described.name = Interface::from_bytes(name).unwrap_or(described.name);
                 }
-                // A power of ten, or with the highest bit one of two.
+                // A power of ten, or with the highest bit set, of two.
                 (IF_TSRESOL, &[power]) => {
                     let base: u64 = if power & 0x80 == 0 { 10 } else { 2 };
                     described.resolution = base.checked_pow(u32::from(power & 0x7F))?;
@@ -238,7 +238,7 @@ fn entry(bytes: &[u8]) -> Option<Result<Entry, Problem>> {
     }
     let raw = u32::from_be_bytes([a, b, c, d]);
     let len = usize::from(len);
-    // Without the mark it is a frame of an older kernel: then the room for its data says what it is.
+    // Without the mark it is a frame of an older kernel: then the room for its data decides.
     let is_fd = flags & FLAG_FDF != 0 || len > CLASSICAL_MAX || data.len() > CLASSICAL_MAX;
     if raw & ERROR_FLAG != 0 {
         let details = data.get(..len)?;

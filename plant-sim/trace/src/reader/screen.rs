@@ -1,16 +1,16 @@
-//! What candump prints on a screen: ` (1727438342.368435)  can0  RX B -  0C0  [12]  03 F5 ...`.
+//! Screen output of candump: ` (1727438342.368435)  can0  RX B -  0C0  [12]  03 F5 ...`.
 //!
-//! The screen tells the bit rate switch only with `-x`; without it, it is taken as set, as on nearly every FD bus.
+//! The screen shows the bit rate switch only with `-x`; otherwise it is assumed to be set, as on nearly every FD bus.
 
 use protocol::frame::{CanFrame, FD_MAX};
 
 use crate::line::{Problem, fd, id, split_at_byte, timestamp};
 use crate::{Direction, ERROR_FLAG, Entry, ErrorFrame, Interface, Record};
 
-/// Digits of a second since 1970. candump prints fewer for times since the start or since the frame before.
+/// Digits of a second since 1970. candump prints fewer for times since the start or since the previous frame.
 const ABSOLUTE: usize = 10;
 
-/// Whether a line is one for the screen: what stands where a log has identifier and data has no `#`.
+/// Whether a line is screen output: there is no `#` where a log has identifier and data.
 pub(super) fn is_screen(line: &[u8]) -> bool {
     let frame = match split_at_byte(line, b')') {
         Some((_, rest)) => words(rest).nth(1),
@@ -36,7 +36,7 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
         .filter(|word| !word.is_empty())
 }
 
-/// Number in brackets and how many digits it has.
+/// Number in brackets and its count of digits.
 fn length(word: &[u8]) -> Option<(usize, usize)> {
     let inner = match word {
         [b'[', inner @ .., b']'] | [b'{', inner @ .., b'}'] => inner,
@@ -125,7 +125,7 @@ pub(super) fn parse(line: &[u8]) -> Result<Record, Problem> {
     Ok(record)
 }
 
-/// Value of a word that stands within `line`.
+/// Value of a word within `line`.
 fn hex(word: &[u8], line: &[u8]) -> Result<u32, Problem> {
     let mut value: u32 = 0;
     for &byte in word.iter().take(8) {

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-/// Bins to a factor of two: an edge is at most 0.4 % from the next; up to twice as many microseconds, each has a bin.
+/// Bins per factor of two: neighbouring edges differ by at most 0.4 %. Below twice this number, every microsecond has
+/// its own bin.
 const BINS: u64 = 256;
 /// Most bins of a histogram.
 const SHOWN: usize = 12;
-/// Share of the periods that lie below the 90 % range, and above it.
+/// Share of the periods below the 90 % range, and above it.
 const TAIL: f64 = 0.05;
 
 /// Periods of one identifier, in us.
@@ -20,7 +21,7 @@ pub(super) struct Periods {
     squares: f64,
     min: u64,
     max: u64,
-    /// How many in each bin, by number.
+    /// Counts by bin number.
     bins: BTreeMap<u64, u64>,
 }
 
@@ -41,7 +42,7 @@ impl Periods {
         *self.bins.entry(bin(period_us)).or_default() += 1;
     }
 
-    /// What there is to say; `None` without a period.
+    /// The statistics; `None` without a period.
     pub(super) fn statistics(&self) -> Option<PeriodStatistics> {
         let (low, high) = (self.quantile(TAIL)?, self.quantile(1.0 - TAIL)?);
         Some(PeriodStatistics {
@@ -57,12 +58,12 @@ impl Periods {
         })
     }
 
-    /// No edge of a bin says more than was seen.
+    /// Clamps the edge of a bin to the extremes seen.
     fn clamp(&self, period_us: u64) -> u64 {
         period_us.clamp(self.min, self.max)
     }
 
-    /// The bin below or in which this share of the periods lies.
+    /// The bin up to which this share of the periods lies.
     fn quantile(&self, share: f64) -> Option<u64> {
         let rank = ((share * self.count as f64).ceil() as u64).max(1);
         let mut seen = 0;
@@ -72,7 +73,7 @@ impl Periods {
         })
     }
 
-    /// Neighbouring bins put together until few are left; each holds about as many bins, none is empty.
+    /// Neighbouring bins merged until few are left, each of about as many bins and none empty.
     fn histogram(&self) -> Vec<Bin> {
         let (Some((&first, _)), Some((&last, _))) =
             (self.bins.first_key_value(), self.bins.last_key_value())
@@ -127,20 +128,20 @@ pub struct PeriodStatistics {
     pub max_ms: f64,
     /// Standard deviation.
     pub jitter_ms: f64,
-    /// Between these lie nine of ten: one of twenty is shorter, one of twenty longer. Within 0.4 %.
+    /// Range of nine periods in ten: one in twenty is shorter, one in twenty longer. Accurate to 0.4 %.
     pub range_90_ms: [f64; 2],
-    /// How many were how long; bins without any are left out.
+    /// Counts by length; empty bins are left out.
     pub histogram: Vec<Bin>,
 }
 
 /// Periods of about the same length.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bin {
-    /// Shortest that counts here, ms.
+    /// Shortest in this bin, ms.
     pub from_ms: f64,
-    /// Longest that counts here, ms.
+    /// Longest in this bin, ms.
     pub to_ms: f64,
-    /// How many.
+    /// Count.
     pub count: u64,
 }
 

@@ -1,10 +1,10 @@
-//! Statistics as a person reads them.
+//! Statistics as text.
 
 use std::fmt;
 
 use super::{BusStatistics, IdStatistics, Statistics};
 
-/// A step of time that is worth a word, s.
+/// A step of time worth mentioning, s.
 const STEP_S: f64 = 1.0;
 /// Signs of the longest bar of a histogram.
 const BAR: u64 = 40;
@@ -22,20 +22,20 @@ impl fmt::Display for Statistics {
         if self.backwards > 0 {
             writeln!(
                 f,
-                "{} records are earlier than one before, by up to {:.6} s",
+                "{} records are earlier than a previous one, by up to {:.6} s",
                 self.backwards, self.largest_step_back_s
             )?;
         }
         if self.skipped_steps > 0 {
             writeln!(
                 f,
-                "{} gaps of together {:.6} s are left out, the largest {:.6} s",
+                "{} gaps, {:.6} s in total, are left out, the largest {:.6} s",
                 self.skipped_steps, self.skipped_s, self.largest_step_s
             )?;
         } else if self.largest_step_s > STEP_S {
             writeln!(
                 f,
-                "the largest step from a record to the next is {:.6} s; --skip-gaps leaves such steps out",
+                "the largest step between two records is {:.6} s; --skip-gaps leaves such steps out",
                 self.largest_step_s
             )?;
         }
@@ -155,7 +155,7 @@ impl Statistics {
                     .max()
                     .unwrap_or(1);
                 for bin in &period.histogram {
-                    // What is there is seen.
+                    // A bin that is not empty shows.
                     let bar = "#".repeat((bin.count * BAR).div_ceil(most) as usize);
                     let range = format!("{:.3} to {:.3}", bin.from_ms, bin.to_ms);
                     text += &format!("{range:>24} {:>9} {bar}\n", bin.count);

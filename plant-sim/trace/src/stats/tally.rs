@@ -1,4 +1,4 @@
-//! What was seen of one identifier.
+//! Counts of one identifier.
 
 use protocol::codec::{self, DecodeError};
 use protocol::e2e::{Receiver, Verdict};
@@ -13,7 +13,7 @@ use crate::decode::id;
 
 /// A period this many times the usual one is a gap.
 const GAP: f64 = 1.5;
-/// Periods of a message of unknown rate before its mean is taken for the usual one.
+/// Periods of a message of unknown rate before their mean counts as the usual one.
 const LEARNED: u64 = 16;
 
 /// Counts of one identifier.
@@ -58,7 +58,7 @@ impl Tally {
         }
     }
 
-    /// Takes a frame in; gives its message if it is one.
+    /// Adds a frame; returns its message if it has one.
     pub(super) fn frame(
         &mut self,
         time_us: u64,
@@ -67,7 +67,7 @@ impl Tally {
     ) -> Option<Message> {
         self.frames += 1;
         self.busy_ns += busy_ns;
-        // A clock that was set back gives no period.
+        // A clock set back gives no period.
         let period = self
             .newest_us
             .and_then(|newest| time_us.checked_sub(newest));
@@ -99,12 +99,12 @@ impl Tally {
         None
     }
 
-    /// A time that is not counted follows.
+    /// Starts a time that is not counted.
     pub(super) fn pause(&mut self) {
         self.newest_us = None;
     }
 
-    /// The node of this number, or every one for 0, starts again.
+    /// The node of this number, or every node for 0, restarts.
     pub(super) fn reset(&mut self, node: u8) {
         let is_it = |sender: Node| node == 0 || node == sender.code();
         if let Some(receiver) = &mut self.receiver
@@ -114,7 +114,7 @@ impl Tally {
         }
     }
 
-    /// The period that is due, us; `None` if there is none, or it is not known yet.
+    /// The usual period, us; `None` if there is none or it is not known yet.
     fn usual_us(&self) -> Option<f64> {
         match self.rate {
             Rate::Hertz(hertz) => Some(1e6 / f64::from(hertz)),

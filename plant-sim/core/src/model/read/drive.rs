@@ -7,13 +7,13 @@ use super::super::{DriveTrain, JointLimits, ModelError};
 use super::{ANY_NOT_NEGATIVE, ANY_POSITIVE, each};
 use crate::allowed::Allowed;
 
-/// What a Command can carry.
+/// Limit of the Command message.
 const MOTOR_TORQUE: Allowed = Allowed::above_zero(200.0, "N m");
-/// What a Feedback can carry, less a quarter for a motor that is driven faster than it may be.
+/// Limit of the Feedback message, less a fifth for a motor driven beyond its limit.
 const MOTOR_SPEED: Allowed = Allowed::above_zero(1600.0, "rad/s");
-/// One count a sample must not read as full speed.
+/// One count per sample must not read as full speed.
 const FEWEST_COUNTS: f64 = 256.0;
-/// Keys that mean something, and those that other programs put into the same object.
+/// Known keys, including those that other programs put into the same object.
 const DRIVE: &[&str] = &[
     "gear_ratio",
     "ball_screw_lead_m_per_rev",
@@ -77,7 +77,7 @@ pub(super) fn drive(
     Ok(drive)
 }
 
-/// Motor positions travel as 32-bit counts: they must hold the whole range of every axis, with as much again beyond it.
+/// Motor positions are sent as 32-bit counts: these must cover twice the range of every axis.
 fn check_encoder(
     node: &Node<'_>,
     drive: &DriveTrain,
@@ -97,7 +97,7 @@ fn check_encoder(
             return Err(node
                 .get("encoder_counts_per_motor_rev", "")?
                 .wrong(format!(
-                    "at most {most}: the motor of the {axis} makes {turns:.1} turns to its limit, and its position travels as 32 bits"
+                    "at most {most}: the motor of the {axis} makes {turns:.1} turns to its limit, and its position is sent as 32 bits"
                 )));
         }
     }
