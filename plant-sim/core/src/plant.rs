@@ -7,10 +7,12 @@ pub mod arm;
 pub mod brake;
 pub mod drive;
 pub mod encoder;
+mod energy;
+mod factor;
 mod friction;
 mod integrator;
 pub mod kinematics;
-pub mod spatial;
+mod planar;
 pub mod stop;
 
 use crate::model::{Payload, RobotModel};
@@ -18,7 +20,9 @@ use arm::{Arm, Configuration};
 use brake::Brake;
 use drive::Drive;
 use encoder::Encoder;
-use integrator::Rates;
+pub use energy::Energy;
+use factor::Factor;
+use integrator::{Rates, Slope};
 use kinematics::Pose;
 use nalgebra::{Matrix4, Vector4};
 use stop::EndStops;
@@ -58,24 +62,6 @@ pub struct Sample {
     pub motor_torque: [f64; 4],
 }
 
-/// Energy balance, J.
-///
-/// `kinetic + potential + elastic - motor_work + lost` is constant except for integration errors and for payloads
-/// that are attached or released.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Energy {
-    /// Of links, payload and rotors.
-    pub kinetic: f64,
-    /// Zero with all mass in the plane of frame 0.
-    pub potential: f64,
-    /// In the springs of the end stops.
-    pub elastic: f64,
-    /// Work that the motors have done since the beginning.
-    pub motor_work: f64,
-    /// Energy that friction, brake and end stops have dissipated since the beginning.
-    pub lost: f64,
-}
-
 /// Efforts and losses at one state.
 struct Balance {
     /// Sum of efforts that accelerate the joints.
@@ -83,24 +69,14 @@ struct Balance {
     rates: Rates,
 }
 
-/// Step (ns) that settles a loaded axis on its friction law within a few steps.
-///
-/// The integrator is stable at any stiffness, but where friction builds up over less than a thirtieth of the speed
-/// that it can remove in one step, a loaded axis oscillates about rest with a fraction of that speed. Friction so steep
-/// that steps of 10 us do not suffice is left to oscillate by some 0.01 mm/s.
-fn resolvable_step(mass: &Matrix4<f64>, drive: &Drive) -> u64 {
-    let response = integrator::factor(mass).inverse().diagonal();
-    let steepest = response
-        .component_mul(&drive.friction_secant(&Vector4::zeros()))
-        .max();
-    ((30e9 / steepest) as u64).clamp(10_000, Plant::MAX_STEP_NS)
-}
-
 impl Plant {
-    /// Longest step of integration, ns. The fastest motion to resolve is a joint on its end stop (400 rad/s): a
-    /// fifth of a radian per step. The gate's path differs from that of 50 us steps by less than a micrometre. Only a
-    /// robot with extremely steep friction gets shorter steps.
-    pub const MAX_STEP_NS: u64 = 500_000;
+    /// Longest step of integration, ns: what is left of a millisecond after the command has arrived. The fastest thing it
+    /// must resolve is a joint on its end stop (400 rad/s): three tenths of a radian a step. Only a robot with extremely
+    /// steep friction gets shorter steps.
+    pub const MAX_STEP_NS: u64 = 750_000;
+
+    /// Longest step while the brake slides, ns.
+    const BRAKING_STEP_NS: u64 = 250_000;
 
     /// The robot of `model` at rest at joint positions `q`.
     pub fn new(model: &RobotModel, q: [f64; 4]) -> Self {
@@ -112,7 +88,11 @@ impl Plant {
             arm,
             encoder: Encoder::new(model.drive.encoder_counts),
             stops: EndStops::new(&model.limits, &stretched.diagonal()),
-            max_step: resolvable_step(&stretched, &drive),
+            max_step: integrator::resolvable_step(
+                &stretched,
+                &drive.friction_secant(&Vector4::zeros()),
+            )
+            .clamp(10_000, Self::MAX_STEP_NS),
             drive,
             brake: Brake::new(model.limits.effort[LIFT]),
             model: model.clone(),
@@ -206,7 +186,7 @@ impl Plant {
         self.brake.update(self.now);
         while self.now < t {
             let end = t
-                .min(self.now + self.max_step)
+                .min(self.now + self.longest_step())
                 .min(self.brake.due().unwrap_or(u64::MAX));
             self.step((end - self.now) as f64 * 1e-9);
             self.now = end;
@@ -214,19 +194,40 @@ impl Plant {
         }
     }
 
+    /// Shorter where a brake slides: it stops within one step, and half of that step is how far it may err.
+    fn longest_step(&self) -> u64 {
+        if self.brake.is_closed() && !self.brake.is_sticking() {
+            self.max_step.min(Self::BRAKING_STEP_NS)
+        } else {
+            self.max_step
+        }
+    }
+
     fn step(&mut self, h: f64) {
         let at = self.arm.at(&self.q);
+        let mass = self.total_mass(&at);
         if self.brake.is_sticking() {
-            self.brake.load(self.effort_on_brake(&at));
+            let friction = self.friction(&self.qd);
+            let balance = self.balance(&at, &self.q, &self.qd, &friction);
+            let load = self.effort_on_brake(&mass, &balance.effort);
+            self.brake.load(load);
         }
-        let mass = self.constrained(self.total_mass(&at));
-        let mut damping = self.drive.friction_secant(&self.qd);
-        damping[LIFT] += self.brake.sliding_secant(self.qd[LIFT]);
+        let damping = self.damping(&self.qd);
+        let friction = damping.component_mul(&self.qd);
+        let balance = self.balance(&at, &self.q, &self.qd, &friction);
+        let mass = self.constrained(mass);
+        let first = Slope {
+            force: self.free(balance.effort),
+            rates: balance.rates,
+        };
         let (mut q, mut qd) = (self.q, self.qd);
-        let ledger = integrator::step(&mut q, &mut qd, h, &mass, &damping, |q, qd| {
+        let ledger = integrator::step(&mut q, &mut qd, h, &mass, &damping, first, |q, qd| {
             let at = self.arm.at(q);
-            let balance = self.balance(&at, q, qd);
-            (self.acceleration(&at, &balance.effort), balance.rates)
+            let balance = self.balance(&at, q, qd, &self.friction(qd));
+            Slope {
+                force: mass * self.acceleration(&self.total_mass(&at), &balance.effort),
+                rates: balance.rates,
+            }
         });
         (self.q, self.qd) = (q, qd);
         self.ledger += ledger;
@@ -238,7 +239,7 @@ impl Plant {
     /// Stops a gripped lift from its last millimetre per second by an impulse at the lift.
     fn stop_lift(&mut self) {
         let mass = self.total_mass(&self.arm.at(&self.q));
-        let response = integrator::factor(&mass).solve(&Vector4::ith(LIFT, 1.0));
+        let response = Factor::of(&mass).solve(&Vector4::ith(LIFT, 1.0));
         let impulse = -self.qd[LIFT] / response[LIFT];
         // The work of an impulse is at the mean of the speeds before and after.
         self.ledger[5] -= 0.5 * impulse * self.qd[LIFT];
@@ -260,26 +261,45 @@ impl Plant {
         mass
     }
 
-    fn acceleration(&self, at: &Configuration, effort: &Vector4<f64>) -> Vector4<f64> {
-        let mut effort = *effort;
+    /// Efforts without that on the lift while the brake holds it.
+    fn free(&self, mut effort: Vector4<f64>) -> Vector4<f64> {
         if self.brake.is_sticking() {
             effort[LIFT] = 0.0;
         }
-        integrator::factor(&self.constrained(self.total_mass(at))).solve(&effort)
+        effort
     }
 
-    /// Effort on a sticking brake, N.
-    fn effort_on_brake(&self, at: &Configuration) -> f64 {
-        let effort = self.balance(at, &self.q, &self.qd).effort;
-        let acceleration = self.acceleration(at, &effort);
-        effort[LIFT] - (self.total_mass(at) * acceleration)[LIFT]
+    fn acceleration(&self, mass: &Matrix4<f64>, effort: &Vector4<f64>) -> Vector4<f64> {
+        Factor::of(&self.constrained(*mass)).solve(&self.free(*effort))
     }
 
-    fn balance(&self, at: &Configuration, q: &Vector4<f64>, qd: &Vector4<f64>) -> Balance {
-        let speed = self.drive.to_motor(qd);
-        let torque = self.given_torque(&speed);
+    /// What a sticking brake must hold, N.
+    fn effort_on_brake(&self, mass: &Matrix4<f64>, effort: &Vector4<f64>) -> f64 {
+        effort[LIFT] - (mass * self.acceleration(mass, effort))[LIFT]
+    }
+
+    fn friction(&self, qd: &Vector4<f64>) -> Vector4<f64> {
         let mut friction = self.drive.friction(qd);
         friction[LIFT] += self.brake.sliding_friction(qd[LIFT]);
+        friction
+    }
+
+    /// Friction over speed.
+    fn damping(&self, qd: &Vector4<f64>) -> Vector4<f64> {
+        let mut damping = self.drive.friction_secant(qd);
+        damping[LIFT] += self.brake.sliding_secant(qd[LIFT]);
+        damping
+    }
+
+    fn balance(
+        &self,
+        at: &Configuration,
+        q: &Vector4<f64>,
+        qd: &Vector4<f64>,
+        friction: &Vector4<f64>,
+    ) -> Balance {
+        let speed = self.drive.to_motor(qd);
+        let torque = self.given_torque(&speed);
         let stop = self.stops.effort(q, qd);
         let effort = self.drive.joint_effort(&torque) - self.arm.bias(at, qd) - friction + stop;
         let lost = friction.dot(qd) - stop.dot(qd) - self.stops.spring_power(q, qd);
@@ -353,20 +373,7 @@ impl Plant {
         self.drive.joint_effort(&self.motor_torque().into()).into()
     }
 
-    /// The energy balance.
-    pub fn energy(&self) -> Energy {
-        let at = self.arm.at(&self.q);
-        let rotors = 0.5 * self.qd.dot(&(self.drive.rotor_inertia() * self.qd));
-        Energy {
-            kinetic: self.arm.kinetic_energy(&at, &self.qd) + rotors,
-            potential: self.arm.potential_energy(&at),
-            elastic: self.stops.energy(&self.q),
-            motor_work: self.ledger[4],
-            lost: self.ledger[5],
-        }
-    }
-
-    /// The rigid arm with its payload.
+    /// The rigid arm with what it holds.
     pub fn arm(&self) -> &Arm {
         &self.arm
     }

@@ -13,8 +13,10 @@ use std::f64::consts::TAU;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drive {
     train: DriveTrain,
-    coupling: Matrix4<f64>,
-    coupling_inverse: Matrix4<f64>,
+    /// The diagonal of A; radians of the motor per radian, for the lift per metre.
+    ratio: Vector4<f64>,
+    /// Its entry beside the lift's: radians that the nut follows per radian of the wrist.
+    follow: f64,
     rotor_inertia: Matrix4<f64>,
 }
 
@@ -30,47 +32,48 @@ impl Drive {
         let [n1, n2, n3, n4] = train.gear_ratio;
         let nut = n3 * TAU / train.screw_lead;
         let follow = n3 * train.screw_hand;
+        let [j1, j2, j3, j4] = train.rotor_inertia;
         #[rustfmt::skip]
-        let coupling = Matrix4::new(
-            n1, 0.0, 0.0, 0.0,
-            0.0, n2, 0.0, 0.0,
-            0.0, 0.0, nut, follow,
-            0.0, 0.0, 0.0, n4,
+        let rotor_inertia = Matrix4::new(
+            n1 * n1 * j1, 0.0, 0.0, 0.0,
+            0.0, n2 * n2 * j2, 0.0, 0.0,
+            0.0, 0.0, nut * nut * j3, nut * follow * j3,
+            0.0, 0.0, nut * follow * j3, n4 * n4 * j4 + follow * follow * j3,
         );
-        #[rustfmt::skip]
-        let coupling_inverse = Matrix4::new(
-            1.0 / n1, 0.0, 0.0, 0.0,
-            0.0, 1.0 / n2, 0.0, 0.0,
-            0.0, 0.0, 1.0 / nut, -follow / (nut * n4),
-            0.0, 0.0, 0.0, 1.0 / n4,
-        );
-        let rotors = Matrix4::from_diagonal(&train.rotor_inertia.into());
         Self {
             train: *train,
-            coupling,
-            coupling_inverse,
-            rotor_inertia: coupling.transpose() * rotors * coupling,
+            ratio: Vector4::new(n1, n2, nut, n4),
+            follow,
+            rotor_inertia,
         }
     }
 
     /// Motor angles (rad) for joint positions, or motor speeds (rad/s) for joint speeds.
     pub fn to_motor(&self, q: &Vector4<f64>) -> Vector4<f64> {
-        self.coupling * q
+        let mut phi = self.ratio.component_mul(q);
+        phi[2] += self.follow * q[3];
+        phi
     }
 
     /// Joint positions for motor angles (rad), or joint speeds for motor speeds.
     pub fn to_joint(&self, phi: &Vector4<f64>) -> Vector4<f64> {
-        self.coupling_inverse * phi
+        let mut q = phi.component_div(&self.ratio);
+        q[2] -= self.follow * q[3] / self.ratio[2];
+        q
     }
 
     /// Joint efforts of the motor torques (N m).
     pub fn joint_effort(&self, motor_torque: &Vector4<f64>) -> Vector4<f64> {
-        self.coupling.tr_mul(motor_torque)
+        let mut effort = self.ratio.component_mul(motor_torque);
+        effort[3] += self.follow * motor_torque[2];
+        effort
     }
 
     /// Motor torques (N m) for these joint efforts.
     pub fn motor_torque(&self, joint_effort: &Vector4<f64>) -> Vector4<f64> {
-        self.coupling_inverse.tr_mul(joint_effort)
+        let mut torque = joint_effort.component_div(&self.ratio);
+        torque[3] -= self.follow * torque[2] / self.ratio[3];
+        torque
     }
 
     /// `A^T J A`: contribution of the rotors to the mass matrix.
@@ -100,7 +103,12 @@ impl Drive {
     pub fn torque_bounds(&self, axis: usize, speed: f64) -> (f64, f64) {
         let limit = self.train.motor_torque_limit[axis];
         let top = self.train.motor_speed_limit[axis];
-        let driving = limit * (1.0 - (speed.abs() - top) / (SPEED_TAPER * top)).clamp(0.0, 1.0);
+        let beyond = speed.abs() - top;
+        let driving = if beyond > 0.0 {
+            limit * (1.0 - beyond / (SPEED_TAPER * top)).max(0.0)
+        } else {
+            limit
+        };
         if speed >= 0.0 {
             (-limit, driving)
         } else {

@@ -1,8 +1,8 @@
 //! Kinematics of the flange: pose, velocity, and inverse kinematics.
 
-use super::arm::{Arm, Configuration};
-use super::spatial::{Motion, Transform};
-use crate::maths::{atan2, hypot, sin_cos};
+use super::arm::{Arm, Configuration, WRIST};
+use super::planar::Transform;
+use crate::maths::{atan2, hypot, sin_cos, square};
 use crate::model::{Geometry, JointLimits};
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector4, Vector6};
 use std::f64::consts::{PI, TAU};
@@ -59,24 +59,34 @@ const TOLERANCE: f64 = 1e-9;
 impl Arm {
     /// Origin (m) and orientation of the flange in frame 0.
     pub fn flange(&self, at: &Configuration) -> (Vector3<f64>, Matrix3<f64>) {
-        let to_flange = self.to_flange(at);
-        (to_flange.origin, to_flange.rotation.transpose())
+        let (_, origin) = self.elbow_and_flange(at);
+        let (sin, cos) = sin_cos(at.q[0] + at.q[1] + WRIST * at.q[3]);
+        // Turned by the yaw about the vertical, and pointing down.
+        let rotation = Matrix3::new(cos, sin, 0.0, sin, -cos, 0.0, 0.0, 0.0, -1.0);
+        (origin, rotation)
     }
 
     /// Forward kinematics.
     pub fn pose(&self, at: &Configuration) -> Pose {
-        let (origin, rotation) = self.flange(at);
+        let (_, origin) = self.elbow_and_flange(at);
         Pose {
             x: origin.x,
             y: origin.y,
             z: origin.z,
-            yaw: wrap(atan2(rotation[(1, 0)], rotation[(0, 0)])),
+            yaw: wrap(at.q[0] + at.q[1] + WRIST * at.q[3]),
         }
     }
 
     /// Geometric Jacobian of the flange origin, in the axes of frame 0; rows vx vy vz wx wy wz.
     pub fn jacobian(&self, at: &Configuration) -> SMatrix<f64, 6, 4> {
-        SMatrix::from_columns(&self.axes_at_flange(at).map(|axis| rows(&axis)))
+        let (elbow, flange) = self.elbow_and_flange(at);
+        let forearm = flange - elbow;
+        SMatrix::from_columns(&[
+            Vector6::new(-flange.y, flange.x, 0.0, 0.0, 0.0, 1.0),
+            Vector6::new(-forearm.y, forearm.x, 0.0, 0.0, 0.0, 1.0),
+            Vector6::new(0.0, 0.0, -1.0, 0.0, 0.0, 0.0),
+            Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, WRIST),
+        ])
     }
 
     /// Velocity of the flange origin (m/s) over its angular velocity (rad/s), in the axes of frame 0.
@@ -84,28 +94,37 @@ impl Arm {
         self.jacobian(at) * qd
     }
 
-    /// Time derivative of the Jacobian times `qd`: the classical acceleration of the flange at zero joint acceleration.
+    /// Time derivative of the Jacobian times `qd`: the classical acceleration of the flange at zero joint acceleration,
+    /// which is what keeps each arm's end on its circle.
     pub fn jacobian_rate_times(&self, at: &Configuration, qd: &Vector4<f64>) -> Vector6<f64> {
-        let axes = self.axes_at_flange(at);
-        let (mut velocity, mut acceleration) = (Motion::zero(), Motion::zero());
-        for (axis, &speed) in axes.iter().zip(qd) {
-            velocity = velocity + *axis * speed;
-            acceleration = acceleration + velocity.cross(axis) * speed;
-        }
-        // Spatial acceleration belongs to the stream of points through a fixed place, but the flange moves along.
-        acceleration.linear += velocity.angular.cross(&velocity.linear);
-        rows(&acceleration)
+        let (elbow, flange) = self.elbow_and_flange(at);
+        let forearm = flange - elbow;
+        let (first, second) = (square(qd[0]), square(qd[0] + qd[1]));
+        Vector6::new(
+            -first * elbow.x - second * forearm.x,
+            -first * elbow.y - second * forearm.y,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
     }
 
-    fn axes_at_flange(&self, at: &Configuration) -> [Motion; 4] {
-        let to_point = Transform::translation(self.to_flange(at).origin);
-        self.axes(at).map(|axis| to_point.motion(&axis))
+    /// Where axis 2 meets the height of the flange, and the origin of the flange; m, frame 0.
+    fn elbow_and_flange(&self, at: &Configuration) -> (Vector3<f64>, Vector3<f64>) {
+        let Geometry { a1, a2, d1, d2, d4 } = self.geometry;
+        let shoulder = Transform {
+            along: 0.0,
+            turn: sin_cos(at.q[0]),
+        };
+        let z = d1 + d2 - d4 - at.q[2];
+        let in_frame_0 = |vector| {
+            let [x, y] = shoulder.turn_back(vector);
+            Vector3::new(x, y, z)
+        };
+        let [x, y] = at.elbow.turn_back([a2, 0.0]);
+        (in_frame_0([a1, 0.0]), in_frame_0([a1 + x, y]))
     }
-}
-
-fn rows(motion: &Motion) -> Vector6<f64> {
-    let (v, w) = (motion.linear, motion.angular);
-    Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
 }
 
 /// Inverse kinematics: the solutions with `theta2 >= 0` and with `theta2 <= 0`, in this order.

@@ -2,10 +2,14 @@
 //!
 //! The oracle shares neither frames nor formulas with the plant: homogeneous transforms of the standard DH table,
 //! Jacobians by cross products, Lagrange's equations with the mass matrix differentiated numerically, and the
-//! articulated-body algorithm on dense 6 x 6 matrices.
+//! articulated-body algorithm on dense 6 x 6 matrices. A second witness runs the plant's own algorithms in six dimensions,
+//! for the step from those to the plane.
 
+mod chain;
 mod oracle;
+mod spatial;
 
+use chain::Chain;
 use nalgebra::{Matrix3, Vector3, Vector4};
 use oracle::{Body, Oracle};
 use proptest::array::{uniform3, uniform4};
@@ -127,6 +131,20 @@ proptest! {
     ) {
         check(&RobotModel::irb_930_22_105(), &payload, &q, &qd, &qdd);
         check(&RobotModel::irb_930_12_085(), &payload, &q, &qd, &qdd);
+    }
+
+    #[test]
+    fn the_plane_leaves_nothing_out(
+        model in robot(), payload in payload(), q in positions(),
+        qd in joints([8.0, 12.0, 2.2, 30.0]), qdd in joints([60.0, 120.0, 60.0, 600.0]),
+    ) {
+        let (chain, arm) = (Chain::new(&model, Some(&payload)), Arm::new(&model, Some(&payload)));
+        let (six, plane) = (chain.at(&q), arm.at(&q));
+        let scale = size(&Oracle::new(&model, &payload));
+        prop_assert!((arm.mass_matrix(&plane) - chain.mass_matrix(&six)).amax() <= 1e-14 * scale);
+        let difference = arm.inverse_dynamics(&plane, &qd, &qdd) - chain.inverse_dynamics(&six, &qd, &qdd);
+        let rates = qdd.amax() + qd.amax().powi(2) + model.gravity.abs();
+        prop_assert!(difference.amax() <= 1e-14 * scale * rates, "off by {:e}", difference.amax());
     }
 
     #[test]

@@ -9,45 +9,45 @@ use std::ops::{Add, AddAssign, Mul};
 /// Motion vector: angular velocity (rad/s) and velocity of the body point at the frame's origin (m/s), or the time
 /// derivatives of both, or a joint axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub(super) struct Motion {
     /// Angular half.
-    pub angular: Vector3<f64>,
+    pub(super) angular: Vector3<f64>,
     /// Linear half.
-    pub linear: Vector3<f64>,
+    pub(super) linear: Vector3<f64>,
 }
 
 /// Force vector: moment about the frame's origin (N m) and force (N).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Force {
+pub(super) struct Force {
     /// Moment.
-    pub moment: Vector3<f64>,
+    pub(super) moment: Vector3<f64>,
     /// Force.
-    pub linear: Vector3<f64>,
+    pub(super) linear: Vector3<f64>,
 }
 
 /// Change of coordinates from frame A to frame B.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transform {
-    /// Maps coordinates of A to coordinates of B.
-    pub rotation: Matrix3<f64>,
+pub(super) struct Transform {
+    /// Turns coordinates of A into coordinates of B.
+    pub(super) rotation: Matrix3<f64>,
     /// Origin of B in coordinates of A, m.
-    pub origin: Vector3<f64>,
+    pub(super) origin: Vector3<f64>,
 }
 
 /// Inertia of a rigid body about the frame's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Inertia {
+pub(super) struct Inertia {
     /// kg.
-    pub mass: f64,
+    pub(super) mass: f64,
     /// First moment of mass: mass times centre of mass, kg m.
-    pub moment: Vector3<f64>,
+    pub(super) moment: Vector3<f64>,
     /// Second moments about the origin, kg m2.
-    pub rotational: Matrix3<f64>,
+    pub(super) rotational: Matrix3<f64>,
 }
 
 impl Motion {
     /// No motion.
-    pub fn zero() -> Self {
+    pub(super) fn zero() -> Self {
         Self {
             angular: Vector3::zeros(),
             linear: Vector3::zeros(),
@@ -55,7 +55,7 @@ impl Motion {
     }
 
     /// Spatial cross product with a motion vector: the rate of change of `other` as it moves with `self`.
-    pub fn cross(&self, other: &Motion) -> Motion {
+    pub(super) fn cross(&self, other: &Motion) -> Motion {
         Motion {
             angular: self.angular.cross(&other.angular),
             linear: self.angular.cross(&other.linear) + self.linear.cross(&other.angular),
@@ -63,16 +63,11 @@ impl Motion {
     }
 
     /// Spatial cross product with a force vector: the rate of change of `force` as it moves with `self`.
-    pub fn cross_force(&self, force: &Force) -> Force {
+    pub(super) fn cross_force(&self, force: &Force) -> Force {
         Force {
             moment: self.angular.cross(&force.moment) + self.linear.cross(&force.linear),
             linear: self.angular.cross(&force.linear),
         }
-    }
-
-    /// Power of `force` on this motion, W.
-    pub fn dot(&self, force: &Force) -> f64 {
-        self.angular.dot(&force.moment) + self.linear.dot(&force.linear)
     }
 }
 
@@ -98,7 +93,7 @@ impl Mul<f64> for Motion {
 
 impl Force {
     /// No force.
-    pub fn zero() -> Self {
+    pub(super) fn zero() -> Self {
         Self {
             moment: Vector3::zeros(),
             linear: Vector3::zeros(),
@@ -124,7 +119,7 @@ impl AddAssign for Force {
 
 impl Transform {
     /// From a frame to itself.
-    pub fn identity() -> Self {
+    pub(super) fn identity() -> Self {
         Self {
             rotation: Matrix3::identity(),
             origin: Vector3::zeros(),
@@ -132,7 +127,7 @@ impl Transform {
     }
 
     /// To a frame with the same axes at `origin`.
-    pub fn translation(origin: Vector3<f64>) -> Self {
+    pub(super) fn translation(origin: Vector3<f64>) -> Self {
         Self {
             rotation: Matrix3::identity(),
             origin,
@@ -140,7 +135,7 @@ impl Transform {
     }
 
     /// To a frame with the same origin, turned by the angle with this sine and cosine about z.
-    pub fn rotation_z((sin, cos): (f64, f64)) -> Self {
+    pub(super) fn rotation_z((sin, cos): (f64, f64)) -> Self {
         Self {
             rotation: Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0),
             origin: Vector3::zeros(),
@@ -148,7 +143,7 @@ impl Transform {
     }
 
     /// From A to C, where `self` goes from A to B and `next` from B to C.
-    pub fn then(&self, next: &Transform) -> Transform {
+    pub(super) fn then(&self, next: &Transform) -> Transform {
         Transform {
             rotation: next.rotation * self.rotation,
             origin: self.origin + self.rotation.tr_mul(&next.origin),
@@ -156,24 +151,15 @@ impl Transform {
     }
 
     /// A motion vector, from A to B.
-    pub fn motion(&self, a: &Motion) -> Motion {
+    pub(super) fn motion(&self, a: &Motion) -> Motion {
         Motion {
             angular: self.rotation * a.angular,
             linear: self.rotation * (a.linear - self.origin.cross(&a.angular)),
         }
     }
 
-    /// A motion vector, from B to A.
-    pub fn motion_back(&self, b: &Motion) -> Motion {
-        let angular = self.rotation.tr_mul(&b.angular);
-        Motion {
-            angular,
-            linear: self.rotation.tr_mul(&b.linear) + self.origin.cross(&angular),
-        }
-    }
-
     /// A force vector, from B to A.
-    pub fn force_back(&self, b: &Force) -> Force {
+    pub(super) fn force_back(&self, b: &Force) -> Force {
         let linear = self.rotation.tr_mul(&b.linear);
         Force {
             moment: self.rotation.tr_mul(&b.moment) + self.origin.cross(&linear),
@@ -182,7 +168,7 @@ impl Transform {
     }
 
     /// An inertia, from B to A.
-    pub fn inertia_back(&self, b: &Inertia) -> Inertia {
+    pub(super) fn inertia_back(&self, b: &Inertia) -> Inertia {
         // Parallel axes twice in one step: from B's origin to the centre of mass and out again to A's.
         let turned = self.rotation.tr_mul(&b.moment);
         let moment = turned + self.origin * b.mass;
@@ -198,7 +184,7 @@ impl Transform {
 
 impl Inertia {
     /// From mass (kg), centre of mass (m) and principal moments about it along the frame's axes (kg m2).
-    pub fn from_com(mass: f64, com: [f64; 3], principal: [f64; 3]) -> Self {
+    pub(super) fn from_com(mass: f64, com: [f64; 3], principal: [f64; 3]) -> Self {
         let com = Vector3::from(com);
         Self {
             mass,
@@ -209,16 +195,11 @@ impl Inertia {
     }
 
     /// Momentum of the body at velocity `v`, or the force for acceleration `v`.
-    pub fn apply(&self, v: &Motion) -> Force {
+    pub(super) fn apply(&self, v: &Motion) -> Force {
         Force {
             moment: self.rotational * v.angular + self.moment.cross(&v.linear),
             linear: v.linear * self.mass - self.moment.cross(&v.angular),
         }
-    }
-
-    /// Kinetic energy at velocity `v`, J.
-    pub fn kinetic_energy(&self, v: &Motion) -> f64 {
-        0.5 * v.dot(&self.apply(v))
     }
 }
 
