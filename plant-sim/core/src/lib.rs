@@ -12,6 +12,7 @@
 //!                        know the controller by its messages alone
 //! world                  what peers share besides the bus: the robot, and what each reports to the run
 //! observer, record       observers of a run, and its trace and truth as text
+//! curves                 what a page draws of a run, in bounded memory
 //! bus                    arbitration and exact frame times
 //! plant, model           the robot in f64, derived independently, and its data
 //! metrics                errors, settling, utilisation
@@ -34,6 +35,7 @@ mod allowed;
 pub mod bus;
 pub mod controller;
 mod convert;
+pub mod curves;
 pub mod drives;
 mod maths;
 pub mod metrics;

@@ -91,6 +91,24 @@ impl<O: Observer> Observer for &mut O {
     }
 }
 
+impl<O: Observer> Observer for Option<O> {
+    fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        self.as_mut()
+            .map_or(Ok(()), |observer| observer.frame(time, frame))
+    }
+
+    fn sample(&mut self, truth: &Truth) -> io::Result<()> {
+        self.as_mut()
+            .map_or(Ok(()), |observer| observer.sample(truth))
+    }
+
+    fn cell_event(&mut self, event: &CellEvent) {
+        if let Some(observer) = self {
+            observer.cell_event(event);
+        }
+    }
+}
+
 impl<A: Observer, B: Observer> Observer for (A, B) {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         self.0.frame(time, frame)?;
