@@ -9,6 +9,7 @@
 //! crash                  planted faults of the board, and where they end
 //! check, replay, plot    a trace judged, repeated and drawn
 //! play, monitor          a trace sent to a bus, and a bus watched
+//! report                 the pages about runs (sources in pages)
 //! chart                  the SVG of plot and of external's histogram
 //! eval, input            models by rows of a table; scenarios and robots from files
 //! ```
@@ -39,6 +40,7 @@ pub mod plot;
 pub mod progress;
 pub mod qemu;
 pub mod replay;
+pub mod report;
 pub mod run;
 pub mod twin;
 pub mod viewers;

@@ -8,7 +8,7 @@
 #     check keeps a command quiet, it sends its standard error to $work/NAME.err, so that the report finds it;
 #   - ends the jobs it has started when it ends.
 #
-# need, need_python, need_vcan and need_cross install what a check depends on (root on Debian) or say what is missing.
+# need, need_python, need_browser, need_vcan and need_cross install what a check depends on (root on Debian) or say what is missing.
 # build_host builds our own programs.
 
 set -Eeuo pipefail
@@ -101,6 +101,18 @@ need_python() { # need_python MODULE==VERSION...: sets $python; versions are fix
         python3 -m venv --clear "$target/peers"
     fi
     "$python" -m pip install --quiet --disable-pip-version-check "$@"
+}
+
+need_browser() { # sets $peers and exports PEERS, CHROMIUM: where tests/pages finds a browser, what drives it, and what judges pages
+    need chromium chromium
+    need node nodejs
+    need npm npm
+    peers=$target/pages
+    mkdir -p "$peers"
+    npm install --prefix "$peers" --no-save --no-package-lock --no-audit --no-fund --silent \
+        playwright-core@1.65.1 axe-core@4.14.1 uplot@1.6.32 2>"$work/npm.err"
+    CHROMIUM=$(type -P chromium)
+    export PEERS=$peers CHROMIUM
 }
 
 need_vcan() { # what tests/with-vcan needs, and candump

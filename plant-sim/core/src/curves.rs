@@ -16,7 +16,6 @@ use serde::Serialize;
 use crate::model::RobotModel;
 use crate::observer::{Observer, Truth};
 use crate::plant::arm::Arm;
-use crate::scenario::{GainsSpec, Mismatch};
 use crate::setup::RunConfig;
 use crate::world::CellEvent;
 
@@ -66,15 +65,9 @@ pub struct Curves {
     command: Option<Instant>,
 }
 
-/// What a page draws, and of what run. Curves are little-endian f32 in base64.
+/// What a page draws. Curves are little-endian f32 in base64.
 #[derive(Clone, Debug, Serialize)]
 pub struct Drawing {
-    /// Name of the scenario.
-    name: String,
-    /// Its text.
-    scenario: String,
-    mismatch: Mismatch,
-    gains: Option<GainsSpec>,
     /// Time between two samples, s.
     step_s: f64,
     /// Samples in all.
@@ -97,7 +90,6 @@ pub struct Drawing {
 /// Lengths and limits that are drawn; see [`crate::model`] for units.
 #[derive(Clone, Debug, Serialize)]
 struct Robot {
-    name: String,
     a1: f64,
     a2: f64,
     d1: f64,
@@ -113,7 +105,6 @@ impl From<&RobotModel> for Robot {
     fn from(model: &RobotModel) -> Self {
         let (geometry, limits) = (&model.geometry, &model.limits);
         Self {
-            name: model.name.clone(),
             a1: geometry.a1,
             a2: geometry.a2,
             d1: geometry.d1,
@@ -147,12 +138,7 @@ impl Curves {
     /// What there is to draw.
     pub fn finish(self, config: &RunConfig) -> Drawing {
         let curves = CURVES.into_iter().zip(&self.curves);
-        let scenario = &config.scenario;
         Drawing {
-            name: scenario.name.clone(),
-            scenario: scenario.source.text.clone(),
-            mismatch: scenario.mismatch,
-            gains: scenario.gains,
             step_s: self.step_s,
             samples: self.samples,
             samples_per_value: self.curves[0].samples_per_value(),

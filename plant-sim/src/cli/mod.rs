@@ -7,6 +7,7 @@ mod eval;
 mod model;
 mod monitor;
 mod parameters;
+mod report;
 mod run;
 mod timing;
 mod trace;
@@ -39,6 +40,8 @@ enum Command {
     Eval(eval::EvalArgs),
     /// Measure how regular the loop with an external controller is, beside what watches over it.
     Timing(timing::TimingArgs),
+    /// Compare two runs on one page.
+    Report(report::ReportArgs),
     /// Look into a recorded trace.
     #[command(subcommand)]
     Trace(trace::TraceCommand),
@@ -62,6 +65,7 @@ pub(crate) fn main() -> Result<ExitCode, String> {
         Some(Command::Crash(args)) => crash::run(&args),
         Some(Command::Eval(args)) => eval::run(&args),
         Some(Command::Timing(args)) => timing::run(&args),
+        Some(Command::Report(args)) => report::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),
         Some(Command::Monitor(args)) => monitor::run(&args),
         Some(Command::Parameters(args)) => parameters::run(&args),

@@ -3,6 +3,7 @@
 mod text;
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -11,11 +12,14 @@ use clap::{Args, ValueEnum};
 use link::{AddressError, LinkAddress, SlcanPeer};
 use plant_sim::external::{LockStep, RealTime, WallClock};
 use plant_sim::input;
+use plant_sim::output;
 use plant_sim::qemu::{self, Channel, Qemu};
-use plant_sim::run;
+use plant_sim::report;
+use plant_sim::run::{self, Results};
 use plant_sim::viewers::Viewers;
 use protocol::time::Period;
 use sim::controller::InProcess;
+use sim::curves::Curves;
 use sim::model::RobotModel;
 use sim::scenario;
 use sim::selection::LawChoice;
@@ -72,9 +76,12 @@ pub(super) struct RunArgs {
     /// The robot as it is (a model file).
     #[arg(long, value_name = "FILE")]
     plant_model: Option<PathBuf>,
-    /// Where trace.log, truth.csv and summary.json go; with --controller qemu controller.log, too.
+    /// Where trace.log, truth.csv, summary.json and report.html go; with --controller qemu controller.log, too.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
+    /// Leave report.html out: the page to look at the run in a browser.
+    #[arg(long)]
+    no_report: bool,
     /// Print summary.json instead of the text.
     #[arg(long)]
     json: bool,
@@ -146,13 +153,24 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, String> {
         nominal: model,
         actual: plant_model,
     };
+    let mut curves = (!args.no_report).then(|| Curves::new(&config));
+    let seen = &mut curves;
     let results = match place {
-        Place::InProcess => run::execute(&config, &args.out),
+        Place::InProcess => {
+            let connect = |config| Ok(InProcess::new(config));
+            run::execute_with(&config, &args.out, connect, &mut (), seen)
+        }
         Place::Watched(server) => {
             let viewers = Viewers::bind(server)
                 .map_err(|error| format!("the bus cannot be watched: {error}"))?;
             let connect = |config| Ok(InProcess::new(config));
-            run::execute_with(&config, &args.out, connect, &mut viewers.clone(), viewers)
+            run::execute_with(
+                &config,
+                &args.out,
+                connect,
+                &mut viewers.clone(),
+                (viewers, seen),
+            )
         }
         Place::Qemu => {
             let options = qemu::Options {
@@ -169,7 +187,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, String> {
                 &args.out,
                 |config| Ok(controller.insert(Qemu::start(config, &options)?)),
                 &mut (),
-                (),
+                seen,
             );
             if let Some(controller) = &mut controller {
                 keep_log(controller, &args.out.join("controller.log"));
@@ -178,7 +196,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, String> {
         }
         Place::LockStep(bus) => {
             let connect = |config| LockStep::connect(bus, config);
-            run::execute_with(&config, &args.out, connect, &mut (), ())
+            run::execute_with(&config, &args.out, connect, &mut (), seen)
         }
         Place::RealTime(bus) => {
             let mut controller = None;
@@ -189,7 +207,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, String> {
                 &args.out,
                 |config| Ok(controller.insert(RealTime::connect(bus, config, &ends)?)),
                 &mut clock,
-                (),
+                seen,
             );
             if let Some(controller) = &controller {
                 eprint!("{}", clock.timing().report());
@@ -199,6 +217,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, String> {
         }
     }
     .map_err(|error| error.to_string())?;
+    keep_report(&config, &results, curves, &args.out)?;
     if args.json {
         show(&results.to_json())?;
     } else {
@@ -208,6 +227,27 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, String> {
         None => Ok(ExitCode::SUCCESS),
         Some(error) => Err(format!("the run was not completed: {error}")),
     }
+}
+
+/// Writes the page about the run. Where none is wanted, that of a run before goes.
+fn keep_report(
+    config: &RunConfig,
+    results: &Results,
+    curves: Option<Curves>,
+    out: &Path,
+) -> Result<(), String> {
+    let path = out.join(report::FILE);
+    let Some(curves) = curves else {
+        return match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                Err(format!("{}: cannot be removed: {error}", path.display()))
+            }
+            _ => Ok(()),
+        };
+    };
+    let drawing = curves.finish(config);
+    let page = report::page(results, &drawing);
+    output::write(&path, &page).map_err(|error| error.to_string())
 }
 
 /// Writes what the controller has logged. A log that is lost takes nothing away from the run.

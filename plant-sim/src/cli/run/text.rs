@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use plant_sim::report::FILE;
 use plant_sim::run::Results;
 use sim::setup::RunConfig;
 use sim::summary::Summary;
@@ -49,7 +50,12 @@ pub(super) fn report(results: &Results, config: &RunConfig, out: &Path) -> Strin
     );
     line!(
         text,
-        "  trace.log, truth.csv, summary.json in {}",
+        "  {}trace.log, truth.csv, summary.json in {}",
+        if out.join(FILE).exists() {
+            "report.html to look at, "
+        } else {
+            ""
+        },
         out.display()
     );
     text

@@ -1,0 +1,29 @@
+//! `plant-sim report`: two runs on one page.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use plant_sim::{output, report};
+
+use super::show;
+
+/// Arguments of `report`.
+#[derive(Args)]
+pub(super) struct ReportArgs {
+    /// Folder of a run, with its report.html.
+    one: PathBuf,
+    /// Folder of the run to compare it with.
+    other: PathBuf,
+    /// The page.
+    #[arg(long, value_name = "FILE", default_value = "compare.html")]
+    out: PathBuf,
+}
+
+/// Writes the page about both.
+pub(super) fn run(args: &ReportArgs) -> Result<ExitCode, String> {
+    let page = report::compare([&args.one, &args.other]).map_err(|error| error.to_string())?;
+    output::write(&args.out, &page).map_err(|error| error.to_string())?;
+    show(&format!("{}\n", args.out.display()))?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,90 @@
+// A headless Chromium for the pages: what they do is watched, and anything that a page must not do is a failure.
+//
+// PEERS names the folder in which npm has installed playwright-core and axe-core, CHROMIUM the browser.
+import { createRequire } from "node:module";
+import { readFileSync } from "node:fs";
+import { pathToFileURL } from "node:url";
+
+const peer = createRequire(`${process.env.PEERS}/`);
+const { chromium } = peer("playwright-core");
+const axe = readFileSync(peer.resolve("axe-core/axe.min.js"), "utf8");
+
+/** The screens that every page is looked at on. */
+export const SCREENS = [
+    { name: "light-wide", colorScheme: "light", viewport: { width: 1280, height: 800 } },
+    { name: "dark-wide", colorScheme: "dark", viewport: { width: 1280, height: 800 } },
+    { name: "light-narrow", colorScheme: "light", viewport: { width: 390, height: 844 } },
+    { name: "dark-narrow", colorScheme: "dark", viewport: { width: 390, height: 844 } },
+];
+
+export function check(holds, message) {
+    if (!holds) {
+        throw new Error(message);
+    }
+}
+
+/** Starts the browser, hands `open` to `use`, and fails if a page has complained or asked anybody for anything. */
+export async function withBrowser(use) {
+    const browser = await chromium.launch({ executablePath: process.env.CHROMIUM, args: ["--no-sandbox"] });
+    const complaints = [];
+    const open = async (file, hash = "", screen = SCREENS[0], motion = "reduce") => {
+        const context = await browser.newContext({ colorScheme: screen.colorScheme, viewport: screen.viewport, reducedMotion: motion });
+        const page = await context.newPage();
+        const own = pathToFileURL(file).href;
+        page.on("console", (message) => {
+            // The last one is about these tests, which read pixels.
+            if (["error", "warning"].includes(message.type()) && !message.text().includes("willReadFrequently")) {
+                complaints.push(`${file}: ${message.text()}`);
+            }
+        });
+        page.on("pageerror", (error) => complaints.push(`${file}: ${error.stack}`));
+        page.on("request", (request) => {
+            if (request.url().split("#")[0] !== own) {
+                complaints.push(`${file} asks for ${request.url()}`);
+            }
+        });
+        await page.goto(own + hash);
+        return page;
+    };
+    try {
+        await use(open);
+    } finally {
+        await browser.close();
+    }
+    check(complaints.length === 0, complaints.join("\n"));
+}
+
+/** Fails with every finding of axe. The page forbids foreign scripts, so axe comes as the browser's own. */
+export async function accessible(page) {
+    await page.evaluate(axe);
+    const { violations } = await page.evaluate(() => globalThis.axe.run());
+    const found = violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html).join("\n    ")}`);
+    check(found.length === 0, `axe finds:\n${found.join("\n")}`);
+}
+
+/** The picture in a canvas of the page, as the bytes of its pixels. */
+export function pixels(page, label) {
+    return page.evaluate((name) => {
+        const canvas = document.querySelector(`canvas[aria-label="${name}"], [aria-label="${name}"] canvas`);
+        const { data, width } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+        return { data: [...data], width };
+    }, label);
+}
+
+/** How many pixels two pictures do not have in common. */
+export function unlike(one, other) {
+    let count = 0;
+    for (let index = 0; index < one.data.length; index += 4) {
+        count += [0, 1, 2, 3].some((part) => one.data[index + part] !== other.data[index + part]) ? 1 : 0;
+    }
+    return count;
+}
+
+/** Nothing is wider than the screen, and no number on the page is missing. */
+export async function sound(page) {
+    const wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+    check(wide <= 0, `the page is ${wide} pixels wider than its screen`);
+    const text = await page.evaluate(() => document.body.innerText);
+    const missing = /undefined|NaN|\[object/.exec(text);
+    check(!missing, `the page says "${missing}"`);
+}

@@ -1,0 +1,141 @@
+// The page about a run, in a browser:
+//
+//   node tests/pages/report.mjs FOLDER-OF-A-RUN FAILED-RUN COMPARISON.html PICTURES
+//
+// Pictures of every screen go into the last folder.
+import { readFileSync } from "node:fs";
+import { SCREENS, accessible, check, pixels, sound, unlike, withBrowser } from "./browser.mjs";
+
+const [run, failed, comparison, pictures] = process.argv.slice(2);
+const CHARTS = [
+    "State of the controller", "Tool error", "Bus load", "Loop time",
+    ...["Shoulder", "Elbow", "Lift", "Wrist"].flatMap((axis) => [`${axis} position`, `${axis} error`, `${axis} ${axis === "Lift" ? "force" : "torque"}`]),
+].map((title) => `${title} over time`);
+
+/** Rows of truth.csv by the names of its columns. */
+function truth() {
+    const [head, ...rows] = readFileSync(`${run}/truth.csv`, "utf8").trimEnd().split("\n").map((row) => row.split(","));
+    return rows.map((row) => Object.fromEntries(row.map((value, column) => [head[column], Number(value)])));
+}
+
+/** The middle of the pixels of a colour, and how many there are. */
+function middle({ data, width }, [red, green, blue]) {
+    let [count, x, y] = [0, 0, 0];
+    for (let index = 0; index < data.length; index += 4) {
+        if (data[index] === red && data[index + 1] === green && data[index + 2] === blue) {
+            count += 1;
+            x += (index / 4) % width;
+            y += Math.floor(index / 4 / width);
+        }
+    }
+    return { count, x: x / count, y: y / count };
+}
+
+const seek = (page, t) => page.getByLabel("Time", { exact: true }).fill(String(t));
+
+/** The arm is where the truth has it: the middle of what is drawn of it moves as the middle of the links does. */
+async function armFollowsTheTruth(page) {
+    const name = "The arm from above, with the path of its tool";
+    const body = await page.evaluate(() => {
+        const hex = getComputedStyle(document.documentElement).getPropertyValue("--body").trim();
+        return [1, 3, 5].map((place) => parseInt(hex.slice(place, place + 2), 16));
+    });
+    const rows = truth();
+    const reach = rows.map(({ q1 }) => q1);
+    const [one, other] = [Math.min(...reach), Math.max(...reach)].map((q1) => rows[reach.indexOf(q1)]);
+    const links = ({ q1, x, y }) => {
+        // Both links are about as long and as broad: half of the way to the elbow, and half of the way from there to the tool.
+        const elbow = [0.56 * Math.cos(q1), 0.56 * Math.sin(q1)];
+        return [(2 * elbow[0] + x) / 4, (2 * elbow[1] + y) / 4];
+    };
+    const seen = [];
+    for (const row of [one, other]) {
+        await seek(page, row.t);
+        seen.push(middle(await pixels(page, name), body));
+    }
+    check(seen.every(({ count }) => count > 2000), `the arm has ${seen.map(({ count }) => count)} pixels`);
+    const [before, after] = [links(one), links(other)];
+    const expected = Math.atan2(after[1] - before[1], after[0] - before[0]);
+    const found = Math.atan2(seen[0].y - seen[1].y, seen[1].x - seen[0].x);
+    const apart = Math.abs(Math.atan2(Math.sin(found - expected), Math.cos(found - expected)));
+    check(apart < 0.35, `the arm moves ${found} rad on the page and ${expected} rad in truth.csv`);
+}
+
+/** The tool error of the page's readout is the distance in truth.csv, at a place of the chart that is pointed at. */
+async function chartsShareCursorAndZoom(page) {
+    const place = page.getByRole("img", { name: "Shoulder position over time" });
+    const other = page.getByRole("img", { name: "Lift error over time" });
+    const readout = (chart) => chart.locator("xpath=..").locator(".readout").innerText();
+    const before = await readout(other);
+    await place.locator(".u-over").hover();
+    check((await readout(other)) !== before, "the cursor of one chart is not that of another");
+    const picture = await pixels(page, "Lift error over time");
+    const box = await place.locator(".u-over").boundingBox();
+    await page.mouse.move(box.x + box.width * 0.3, box.y + 40);
+    await page.mouse.down();
+    await page.mouse.move(box.x + box.width * 0.5, box.y + 40, { steps: 4 });
+    await page.mouse.up();
+    const zoomed = await pixels(page, "Lift error over time");
+    check(unlike(picture, zoomed) > 100, "zooming into one chart does not zoom another");
+    await page.getByLabel("What the charts show").selectOption("");
+    await page.getByLabel("What the charts show").selectOption({ label: "Cycle 2" });
+    check(unlike(zoomed, await pixels(page, "Lift error over time")) > 100, "choosing a cycle changes nothing");
+    await page.getByLabel("What the charts show").selectOption({ label: "Whole run" });
+}
+
+async function buttonsAct(page) {
+    const time = () => page.getByLabel("Time", { exact: true }).inputValue();
+    await seek(page, 0.2);
+    const before = await time();
+    await page.getByRole("button", { name: "Play" }).press("Enter");
+    await page.waitForFunction((was) => document.querySelector("input[aria-label=Time]").value !== was, before);
+    await page.getByRole("button", { name: "Pause" }).press("Space");
+    const chart = "Tool error over time";
+    for (const name of ["Zoom in", "Later", "Earlier", "Zoom out"]) {
+        const was = await pixels(page, chart);
+        await page.getByRole("button", { name, exact: true }).press("Enter");
+        check(unlike(was, await pixels(page, chart)) > 20, `${name} changes nothing`);
+    }
+    const path = await pixels(page, "The path of the tool, reference and actual");
+    await page.getByLabel("Magnification of the deviation").selectOption({ label: "deviation × 1" });
+    check(unlike(path, await pixels(page, "The path of the tool, reference and actual")) > 20, "the deviation is not magnified");
+}
+
+async function everythingIsDrawn(page) {
+    for (const name of CHARTS) {
+        const picture = await pixels(page, name);
+        const empty = { ...picture, data: picture.data.map(() => 0) };
+        check(unlike(picture, empty) > 200, `${name}: nothing is drawn`);
+    }
+}
+
+await withBrowser(async (open) => {
+    for (const screen of SCREENS) {
+        for (const [name, file] of [["report", `${run}/report.html`], ["failed", `${failed}/report.html`], ["comparison", comparison]]) {
+            const page = await open(file, "", screen);
+            await seek(page, 0.6);
+            await page.screenshot({ path: `${pictures}/${name}-${screen.name}.png` });
+            // The bar at the lower edge of the screen goes to the end of the page, or it would hide what it lies on.
+            await page.evaluate(() => (document.querySelector(".dock").style.position = "static"));
+            await page.screenshot({ path: `${pictures}/${name}-${screen.name}-whole.png`, fullPage: true });
+            await sound(page);
+            await accessible(page);
+        }
+    }
+    const page = await open(`${run}/report.html`);
+    await everythingIsDrawn(page);
+    await armFollowsTheTruth(page);
+    await chartsShareCursorAndZoom(page);
+    await buttonsAct(page);
+
+    const moved = await open(`${run}/report.html`, "", SCREENS[0], "no-preference");
+    await moved.waitForFunction(() => Number(document.querySelector("input[aria-label=Time]").value) > 0);
+
+    // The link of a fault leads to its moment.
+    const stopped = await open(`${failed}/report.html`);
+    const link = stopped.getByRole("link").first();
+    const t = Number((await link.getAttribute("href")).slice("#t=".length));
+    await link.press("Enter");
+    await stopped.waitForFunction((at) => Math.abs(document.querySelector("input[aria-label=Time]").value - at) < 0.01, t);
+});
+console.log("  every part is drawn, acts and is found by keyboard; axe finds nothing; nothing is asked of anybody");
