@@ -198,7 +198,7 @@ impl Observer for Curves {
             curve.push(value as f32);
         }
 
-        if self.samples % self.stride == 0 {
+        if self.samples.is_multiple_of(self.stride) {
             if self.poses.len() == MOST_POSES {
                 let mut keep = false;
                 self.poses.retain(|_| {

@@ -13,6 +13,7 @@
 //! world                  what peers share besides the bus: the robot, and what each reports to the run
 //! observer, record       observers of a run, and its trace and truth as text
 //! curves                 what a page draws of a run, in bounded memory
+//! curves                 what a page draws of a run, in bounded memory
 //! bus                    arbitration and exact frame times
 //! plant, model           the robot in f64, derived independently, and its data
 //! metrics                errors, settling, utilisation

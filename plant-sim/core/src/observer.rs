@@ -49,7 +49,8 @@ impl PlantState {
     }
 }
 
-/// Observer of a run in progress, with a method per kind of event. A pair of observers is an observer.
+/// Observer of a run in progress, with a method per kind of event. A pair of observers is an observer, and
+/// so is an optional one.
 pub trait Observer {
     /// A frame was delivered.
     ///
