@@ -89,7 +89,7 @@ pub(crate) const ESTOP: &[Signal] = &[
 /// Emergency.
 pub(crate) const EMERGENCY: &[Signal] = &[
     signal("code", 0, Kind::U16, one!("")),
-    signal("register", 2, Kind::U8, one!("")),
+    signal("error_register", 2, Kind::U8, one!("")),
     signal("cause", 3, CAUSE, one!("")),
     signal("data", 4, Kind::U32, one!("")),
 ];

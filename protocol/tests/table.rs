@@ -63,7 +63,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
         Message::EStop(m) => vec![one("reason", m.reason.0), one("counter", m.counter)],
         Message::Emergency(_, m) => vec![
             one("code", m.code),
-            one("register", m.register),
+            one("error_register", m.error_register),
             one("cause", m.cause.code()),
             one("data", m.data),
         ],

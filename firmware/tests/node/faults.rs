@@ -63,7 +63,7 @@ fn a_silent_peer_takes_the_torque_away_and_is_reported() {
         _ => None,
     });
     // CiA 301: 8130h is a failed heartbeat; register bits 0 (generic) and 4 (communication).
-    let told = emergency.map(|e| (e.cause, e.code, e.register));
+    let told = emergency.map(|e| (e.cause, e.code, e.error_register));
     assert_eq!(told, Some((Cause::PeerSilent, 0x8130, 0x11)));
     assert!(is_off(&bench.command()));
 }

@@ -73,6 +73,33 @@ fn names_are_legal_and_unique() {
     assert!(text.is_ascii());
 }
 
+/// Words that C23 and C++23 keep for themselves (ISO/IEC 9899:2024, 6.4.1; ISO/IEC 14882:2024, 5.11 and 5.12).
+const KEYWORDS: &str = "
+    alignas alignof and and_eq asm atomic auto bitand bitor bool break case catch char char16_t char32_t char8_t class co_await
+    co_return co_yield compl concept const const_cast consteval constexpr constinit continue decltype default delete do
+    double dynamic_cast else enum explicit export extern false float for friend goto if inline int long mutable namespace
+    new noexcept not not_eq nullptr operator or or_eq private protected public register reinterpret_cast requires restrict
+    return short signed sizeof static static_assert static_cast struct switch template this thread_local throw true try
+    typedef typeid typename typeof typeof_unqual union unsigned using virtual void volatile wchar_t while xor xor_eq";
+
+/// Generators of C and C++ make identifiers of the names, in lower case or as they are.
+#[test]
+fn names_are_no_keywords_of_c() {
+    let text = dbc::generate();
+    let is_keyword = |name: &str| {
+        KEYWORDS
+            .split_whitespace()
+            .any(|keyword| name.eq_ignore_ascii_case(keyword))
+    };
+    assert!(is_keyword("Register"));
+    for info in TABLE {
+        assert!(!is_keyword(info.name), "{}", info.name);
+        for signal in signals_of(&text, info.id) {
+            assert!(!is_keyword(&signal.name), "{} {}", info.name, signal.name);
+        }
+    }
+}
+
 /// Signals stay inside the message, and share bits only if never present together.
 #[test]
 fn signals_do_not_overlap() {

@@ -92,7 +92,7 @@ pub struct Emergency {
     #[serde(with = "postcard::fixint::le")]
     pub code: u16,
     /// Error register (object 1001h).
-    pub register: u8,
+    pub error_register: u8,
     /// Latched cause.
     pub cause: Cause,
     /// Value that led to the fault, as the bits of an f32 in the unit of [`Fault::unit`].
@@ -114,12 +114,12 @@ impl Emergency {
         Fault::value(self.cause, self.value(), 0.0)
     }
 
-    /// Emergency of this cause, with the code and register that CiA 301 and CiA 402 give it.
+    /// Emergency of this cause, with the code and error register that CiA 301 and CiA 402 give it.
     #[must_use]
     pub const fn new(cause: Cause, data: u32) -> Self {
         Self {
             code: cause.error_code(),
-            register: cause.error_register(),
+            error_register: cause.error_register(),
             cause,
             data,
         }
