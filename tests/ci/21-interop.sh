@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Our traces in the hands of others, and theirs in ours: can-utils, python-can, tshark.
+# Our traces in the hands of others, and theirs in ours: can-utils, python-can, tshark. Our dissector in the hands of tshark
+# shows what we decode.
 source "$(dirname "$0")/lib.bash"
 need log2asc can-utils
 need tshark tshark
-need_python python-can==4.6.1
+need_python python-can==4.6.1 cantools==45.1.0 canmatrix==1.3.3
 build_host
 
 trace=$work/run/trace.log
@@ -11,3 +12,8 @@ trace=$work/run/trace.log
 "$plant_sim" trace check "$trace"
 "$plant_sim" trace replay "$trace"
 "$python" tests/ci/21-interop.py "$plant_sim" "$trace" "$work"
+
+# A run has half of the messages; the random frames of cantools have them all.
+"$plant_sim" dbc --out "$work/scara.dbc"
+"$python" tests/ci/20-dbc.py "$work/scara.dbc" "$plant_sim" "$work"
+"$python" tests/ci/21-dissector.py "$plant_sim" "$work" "$trace" "$work/random.log"

@@ -3,6 +3,7 @@
 mod cost;
 mod crash;
 mod dbc;
+mod dissector;
 mod eval;
 mod model;
 mod monitor;
@@ -51,6 +52,8 @@ enum Command {
     Parameters(parameters::ParametersArgs),
     /// Write the messages of the link as a DBC file.
     Dbc(dbc::DbcArgs),
+    /// Write the messages of the link as a dissector for Wireshark (Lua).
+    Dissector(dissector::DissectorArgs),
     /// Write a robot as an external controller takes it (controller --model).
     Model(model::ModelArgs),
 }
@@ -70,6 +73,7 @@ pub(crate) fn main() -> Result<ExitCode, String> {
         Some(Command::Monitor(args)) => monitor::run(&args),
         Some(Command::Parameters(args)) => parameters::run(&args),
         Some(Command::Dbc(args)) => dbc::run(&args),
+        Some(Command::Dissector(args)) => dissector::run(&args),
         Some(Command::Model(args)) => model::run(&args),
     }
 }

@@ -3,9 +3,9 @@
 //! # Contents
 //!
 //! [`Reader`] and [`Writer`] turn lines into [`Record`]s and back. [`decode`] names every field of a frame, [`stats`]
-//! counts rates, jitter, gaps and losses, [`convert`] writes pcapng and Vector ASC, [`dbc`] the message table for other
-//! tools. All of them stream: memory does not grow with a trace. The crate depends on [`protocol`] alone; anything that
-//! needs a robot or a controller (replay, check, plot) is in `plant-sim`.
+//! counts rates, jitter, gaps and losses, [`convert`] writes pcapng and Vector ASC, [`dbc`] and [`dissector`] the message
+//! table for other tools. All of them stream: memory does not grow with a trace. The crate depends on [`protocol`] alone;
+//! anything that needs a robot or a controller (replay, check, plot) is in `plant-sim`.
 //!
 //! # The path of one Feedback frame
 //!
@@ -31,6 +31,7 @@ pub mod convert;
 pub mod dbc;
 pub mod decode;
 pub mod difference;
+pub mod dissector;
 mod error_frame;
 pub mod fields;
 mod line;

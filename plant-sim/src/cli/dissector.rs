@@ -1,0 +1,28 @@
+//! `plant-sim dissector`: the messages for Wireshark.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use plant_sim::output;
+use trace::dissector;
+
+use super::show;
+
+/// Arguments of `dissector`.
+#[derive(Args)]
+pub(super) struct DissectorArgs {
+    /// Write to this file instead of standard output, as ~/.local/lib/wireshark/plugins/scara.lua.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Writes the Lua file.
+pub(super) fn run(args: &DissectorArgs) -> Result<ExitCode, String> {
+    let text = dissector::generate();
+    match &args.out {
+        Some(path) => output::write(path, &text).map_err(|error| error.to_string())?,
+        None => show(&text)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
