@@ -18,6 +18,8 @@ use pcapng::Pcapng;
 
 /// Byte order mark of UTF-8, which editors on other systems prepend.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+/// First bytes of Vector BLF.
+const BLF: &[u8] = b"LOGG";
 /// Bytes that identify the format.
 const MAGIC: u64 = 4;
 
@@ -92,6 +94,11 @@ impl<R: BufRead> Reader<R> {
             return Err(io::Error::new(
                 io::ErrorKind::InvalidData,
                 "pcap, not pcapng; convert it with: editcap -F pcapng FILE OUT",
+            ));
+        } else if bytes == BLF {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "Vector BLF, which is not read; python-can converts it: python3 -m can.logconvert FILE.blf OUT.log",
             ));
         } else {
             Format::Candump

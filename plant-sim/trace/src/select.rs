@@ -97,7 +97,10 @@ impl FromStr for Ids {
 
 fn id(text: &str) -> Result<Id, String> {
     let digits = text.strip_prefix("0x").unwrap_or(text);
-    let id = u32::from_str_radix(digits, 16).ok().and_then(|raw| {
+    // from_str_radix alone would also take a sign.
+    let is_hex = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
+    let number = u32::from_str_radix(digits, 16).ok().filter(|_| is_hex);
+    let id = number.and_then(|raw| {
         if digits.len() == 8 {
             ExtendedId::new(raw).map(Id::Extended)
         } else {

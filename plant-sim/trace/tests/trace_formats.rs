@@ -324,6 +324,7 @@ fn a_selection_takes_identifiers_interfaces_and_times() {
     assert_eq!(count(&between("0", "1720000000")), 0);
     for wrong in [
         "",
+        "+12",
         "1234",
         "800",
         "20000000",
@@ -336,5 +337,19 @@ fn a_selection_takes_identifiers_interfaces_and_times() {
     }
     for wrong in ["", "-1", "now", "1e3", "++1"] {
         assert!(wrong.parse::<trace::select::Moment>().is_err(), "{wrong}");
+    }
+}
+
+/// Formats that are not read are named with the tool that converts them.
+#[test]
+fn what_is_not_read_is_named_with_its_converter() {
+    for (bytes, tool) in [
+        (&b"LOGG\x90\0\0\0"[..], "can.logconvert"),
+        (b"\xD4\xC3\xB2\xA1\x02\0\x04\0", "editcap -F pcapng"),
+    ] {
+        let Some(Err(ReadError::Io { source, .. })) = Reader::new(bytes).next() else {
+            panic!("{tool}: no failure");
+        };
+        assert!(source.to_string().contains(tool), "{source}");
     }
 }
