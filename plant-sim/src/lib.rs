@@ -8,7 +8,7 @@
 //! external, qemu         controllers in another process and on the emulated board, each beside a twin in this one (twin)
 //! crash                  planted faults of the board, and where they end
 //! check, replay, plot    a trace judged, repeated and drawn
-//! play, monitor          a trace sent to a bus, and a bus watched
+//! play, record, monitor  a trace sent to a bus, a bus recorded, and a bus watched
 //! report                 the pages about runs (sources in pages)
 //! chart                  the SVG of plot and of external's histogram
 //! eval, input            models by rows of a table; scenarios and robots from files
@@ -39,6 +39,7 @@ pub mod play;
 pub mod plot;
 pub mod progress;
 pub mod qemu;
+pub mod record;
 pub mod replay;
 pub mod report;
 pub mod run;

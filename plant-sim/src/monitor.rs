@@ -1,5 +1,6 @@
 //! A bus as it is now: what was seen of it in the last second, and what has gone wrong since the start.
 
+mod pages;
 mod view;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -12,10 +13,12 @@ use protocol::wire::BitTiming;
 use trace::stats::{Gatherer, Statistics};
 use trace::{Entry, Record};
 
+pub use view::{Page, View};
+
 /// Span of the rates shown, us.
 const WINDOW_US: u64 = 1_000_000;
 /// Events kept.
-const EVENTS: usize = 8;
+const EVENTS: usize = 1000;
 /// The same event again within this time is one, us.
 const REPEATED_US: u64 = 100_000;
 
@@ -37,9 +40,21 @@ pub struct Monitor {
 }
 
 /// Something a person wants to know of although it is over.
+#[derive(Clone)]
 struct Event {
     time_us: u64,
     text: String,
+}
+
+/// What there is to know at one moment. It stays as it is while the monitor goes on.
+pub struct Picture {
+    title: String,
+    total: Statistics,
+    window: Option<Statistics>,
+    started_us: Option<u64>,
+    newest: BTreeMap<Id, Record>,
+    state: Option<State>,
+    events: VecDeque<Event>,
 }
 
 impl Monitor {
@@ -67,9 +82,11 @@ impl Monitor {
         self.tick(record.time_us);
         self.total.record(record);
         self.growing.record(record);
-        let Entry::Frame(frame) = &record.entry else {
-            self.event("error frame".into());
-            return;
+        let frame = match &record.entry {
+            Entry::Frame(frame) => frame,
+            Entry::Error(error) => {
+                return self.event(format!("error frame: {}", error.classes().join(", ")));
+            }
         };
         self.newest.insert(frame.id(), *record);
         let Ok(received) = codec::decode(frame) else {
@@ -79,7 +96,10 @@ impl Monitor {
             Message::State(state) => {
                 let before = self.state.replace(state);
                 if before.is_none_or(|before| before.mode != state.mode) {
-                    self.event(format!("mode {}", state.mode));
+                    self.event(match state.cause {
+                        Cause::None => format!("mode {}", state.mode),
+                        _ => format!("mode {}: {}", state.mode, state.fault()),
+                    });
                 }
             }
             Message::Emergency(node, emergency) if emergency.cause == Cause::None => {
@@ -105,6 +125,20 @@ impl Monitor {
             let full = std::mem::replace(&mut self.growing, Gatherer::new(self.timing));
             self.window = Some(full.statistics());
             self.window_end_us = Some(self.newest_us + WINDOW_US);
+        }
+    }
+
+    /// What there is to know now.
+    #[must_use]
+    pub fn picture(&self) -> Picture {
+        Picture {
+            title: self.title.clone(),
+            total: self.total.statistics(),
+            window: self.window.clone(),
+            started_us: self.started_us,
+            newest: self.newest.clone(),
+            state: self.state,
+            events: self.events.clone(),
         }
     }
 

@@ -1,14 +1,15 @@
 //! The monitor's picture of a bus whose traffic is known.
 
-use plant_sim::monitor::Monitor;
+use plant_sim::monitor::{Monitor, View};
 use protocol::codec;
-use protocol::frame::CanFrame;
+use protocol::frame::{CanFrame, StandardId};
 use protocol::messages::{
     Cause, Compensation, DriveStatus, Emergency, FaultAxis, Feedback, Law, LimitFlags, Message,
     Mode, Node, State,
 };
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::KeyCode;
 use trace::{Entry, Interface, Record};
 
 fn take(monitor: &mut Monitor, time_us: u64, frame: CanFrame) {
@@ -51,10 +52,11 @@ fn state(mode: Mode, cause: Cause) -> CanFrame {
     codec::encode(&Message::State(state), 0).unwrap()
 }
 
-/// Lines of the screen.
-fn screen(monitor: &Monitor) -> Vec<String> {
-    let mut terminal = Terminal::new(TestBackend::new(160, 24)).unwrap();
-    terminal.draw(|frame| monitor.draw(frame)).unwrap();
+/// Lines of a terminal of 80 columns and 24 rows.
+fn screen_of(monitor: &Monitor, view: &mut View) -> Vec<String> {
+    let mut terminal = Terminal::new(TestBackend::new(80, 24)).unwrap();
+    let picture = monitor.picture();
+    terminal.draw(|frame| picture.draw(view, frame)).unwrap();
     let buffer = terminal.backend().buffer();
     let area = buffer.area;
     (0..area.height)
@@ -64,6 +66,17 @@ fn screen(monitor: &Monitor) -> Vec<String> {
                 .collect::<String>()
         })
         .collect()
+}
+
+/// The page that is shown after these keys.
+fn screen(monitor: &Monitor, keys: &[KeyCode]) -> Vec<String> {
+    let mut view = View::default();
+    for key in keys {
+        // As at a terminal: it is drawn between two keys.
+        screen_of(monitor, &mut view);
+        assert!(view.key(*key));
+    }
+    screen_of(monitor, &mut view)
 }
 
 fn line(screen: &[String], part: &str) -> String {
@@ -81,7 +94,7 @@ fn rates_are_those_of_the_last_second_and_losses_of_all() {
     for sample in (0..1500).filter(|sample| *sample != 1200) {
         take(&mut monitor, 1000 * u64::from(sample), feedback(sample));
     }
-    let screen = screen(&monitor);
+    let screen = screen(&monitor, &[]);
     assert!(screen[0].starts_with("socketcan:can7"));
     assert!(screen[0].contains("1499 frames"));
     assert!(screen[1].contains("no state of a controller yet"));
@@ -92,7 +105,8 @@ fn rates_are_those_of_the_last_second_and_losses_of_all() {
         words[..7],
         ["1C0", "Feedback", "1000.0", "0.000", "1.000", "1", "0"]
     );
-    assert!(row.contains("sample=1499"));
+    let values = self::screen(&monitor, &[KeyCode::Char('2')]);
+    assert!(line(&values, "sample=1499").contains("status=ready"));
 }
 
 /// Two seconds without a frame: nothing is shown as if it still came.
@@ -104,10 +118,11 @@ fn silence_is_shown() {
     for time in [1_000_000, 2_000_000] {
         monitor.tick(time);
     }
-    let screen = screen(&monitor);
+    let screen = screen(&monitor, &[]);
     assert!(screen[0].contains("load 0.0 %"));
     let row = line(&screen, "Feedback");
-    assert_eq!(row.split_whitespace().nth(2), Some("-"), "{row}");
+    let words: Vec<&str> = row.trim_matches(['│', ' ']).split_whitespace().collect();
+    assert_eq!(words[2], "-", "{row}");
 }
 
 #[test]
@@ -117,11 +132,11 @@ fn states_and_faults_are_told() {
     let emergency = Message::Emergency(Node::Controller, Emergency::new(Cause::OverSpeed, 0));
     take(&mut monitor, 250_000, codec::encode(&emergency, 0).unwrap());
     take(&mut monitor, 260_000, state(Mode::Fault, Cause::OverSpeed));
-    let screen = screen(&monitor);
-    let head = &screen[1];
+    let screen = screen(&monitor, &[KeyCode::Tab, KeyCode::Tab]);
+    let head = screen[1..4].join(" ");
     for part in [
         "fault",
-        "over-speed",
+        "over speed, axis 3 (lift): 2.5",
         "pid:integral",
         "queue 3",
         "torque-lift",
@@ -129,5 +144,96 @@ fn states_and_faults_are_told() {
         assert!(head.contains(part), "{part} in {head}");
     }
     assert!(line(&screen, "0.250 s").contains("controller: over-speed (code 8400h)"));
-    assert!(line(&screen, "0.260 s").contains("mode fault"));
+    assert!(line(&screen, "0.260 s").contains("mode fault: over speed, axis 3 (lift)"));
+    // The newest is on top.
+    let row = |part| screen.iter().position(|line| line.contains(part)).unwrap();
+    assert!(row("0.260 s") < row("0.250 s"));
+}
+
+/// A bus with every message and with forty of a neighbour, on 80 columns: whatever there is can be reached, and nothing is
+/// cut off at the right.
+#[test]
+fn everything_can_be_reached_on_a_small_terminal() {
+    let mut monitor = Monitor::new("slcan:tcp:a-machine-with-a-long-name.example.org:29536");
+    let feedback = Feedback {
+        sample: u32::MAX,
+        status: DriveStatus::READY,
+        position: [i32::MIN, -2_000_000, 3_000_000, 1_999_999_999],
+        velocity: [-1999.123, 1999.123, -0.000_123_4, 1.0],
+        torque: [i16::MIN, -20000, 3, 32767],
+    };
+    let frame = codec::encode(&Message::Feedback(feedback), 0).unwrap();
+    take(&mut monitor, 0, frame);
+    take(
+        &mut monitor,
+        1,
+        state(Mode::FaultReaction, Cause::FollowingError),
+    );
+    for id in 0x400..0x428 {
+        let id = StandardId::new(id).unwrap();
+        take(&mut monitor, 2, CanFrame::classical(id, &[1]).unwrap());
+    }
+    for index in 0..50 {
+        let mode = if index % 2 == 0 {
+            Mode::Ready
+        } else {
+            Mode::Enabled
+        };
+        take(
+            &mut monitor,
+            1_000_000 * index + 3,
+            state(mode, Cause::None),
+        );
+    }
+    for (page, wanted) in [
+        ('1', vec!["1C0", "300", "400", "427"]),
+        (
+            '2',
+            vec![
+                "-2147483648",
+                "1999999999",
+                "-1999.123",
+                "32767",
+                "fault_limit=2.42",
+                "427",
+            ],
+        ),
+        ('3', vec!["mode ready", "0.000 s", "49.000 s"]),
+    ] {
+        let mut view = View::default();
+        view.key(KeyCode::Char(page));
+        let mut seen = screen_of(&monitor, &mut view);
+        for _ in 0..20 {
+            view.key(KeyCode::PageDown);
+            seen.extend(screen_of(&monitor, &mut view));
+        }
+        for part in wanted {
+            line(&seen, part);
+        }
+        // The end stays at the foot of the page, and one key leads back to the beginning.
+        let end = screen_of(&monitor, &mut view);
+        view.key(KeyCode::End);
+        assert_eq!(screen_of(&monitor, &mut view), end);
+        view.key(KeyCode::Home);
+        assert_eq!(screen_of(&monitor, &mut view), seen[..24]);
+    }
+}
+
+/// No size makes it fail, and a word longer than a line is broken.
+#[test]
+fn any_size_of_terminal_is_drawn() {
+    let mut monitor = Monitor::new("bus");
+    take(&mut monitor, 0, feedback(0));
+    take(&mut monitor, 1, state(Mode::Fault, Cause::OverSpeed));
+    for (width, height) in [(1, 1), (3, 3), (10, 5), (79, 2), (300, 100)] {
+        for page in ['1', '2', '3'] {
+            let mut view = View::default();
+            view.key(KeyCode::Char(page));
+            let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+            let picture = monitor.picture();
+            terminal
+                .draw(|frame| picture.draw(&mut view, frame))
+                .unwrap();
+        }
+    }
 }

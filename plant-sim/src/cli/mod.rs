@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand.
 
+mod arrival;
 mod cost;
 mod crash;
 mod dbc;
@@ -8,8 +9,10 @@ mod eval;
 mod model;
 mod monitor;
 mod parameters;
+mod record;
 mod report;
 mod run;
+mod signal;
 mod timing;
 mod trace;
 
@@ -48,6 +51,8 @@ enum Command {
     Trace(trace::TraceCommand),
     /// Watch a bus: identifiers, rates, values, load, states and faults.
     Monitor(monitor::MonitorArgs),
+    /// Record a bus into a file, or into several by size.
+    Record(record::RecordArgs),
     /// List and set parameters of controller and drives over a bus.
     Parameters(parameters::ParametersArgs),
     /// Write the messages of the link as a DBC file.
@@ -71,6 +76,7 @@ pub(crate) fn main() -> Result<ExitCode, String> {
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),
         Some(Command::Monitor(args)) => monitor::run(&args),
+        Some(Command::Record(args)) => record::run(&args),
         Some(Command::Parameters(args)) => parameters::run(&args),
         Some(Command::Dbc(args)) => dbc::run(&args),
         Some(Command::Dissector(args)) => dissector::run(&args),

@@ -2,14 +2,17 @@
 
 use std::io::{self, IsTerminal};
 use std::process::ExitCode;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime};
 
 use clap::Args;
-use link::{Link, LinkAddress, Stamped};
-use plant_sim::monitor::Monitor;
+use link::{Link, LinkAddress};
+use plant_sim::monitor::{Monitor, Picture, View};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
-use trace::{Entry, Interface, Record};
+use trace::Interface;
+
+use super::arrival::{microseconds, record};
+use super::signal;
 
 /// Time between two pictures.
 const REFRESH: Duration = Duration::from_millis(100);
@@ -33,8 +36,10 @@ pub(super) fn run(args: &MonitorArgs) -> Result<ExitCode, String> {
             "monitor draws on a terminal; use candump and `plant-sim trace` for files".into(),
         );
     }
-    let mut link = Link::open(&args.bus).map_err(|error| error.to_string())?;
+    let mut link = Link::watch(&args.bus).map_err(|error| error.to_string())?;
     let monitor = Monitor::new(&args.bus.to_string());
+    signal::end_on_signal()?;
+    // Also restores the terminal in a panic.
     let mut terminal = ratatui::init();
     let result = watch(&mut link, monitor, &mut terminal);
     ratatui::restore();
@@ -47,21 +52,20 @@ fn watch(
     terminal: &mut DefaultTerminal,
 ) -> Result<(), String> {
     let on_screen = |error: io::Error| format!("cannot use the terminal: {error}");
+    let mut view = View::default();
     let mut drawn: Option<Instant> = None;
-    let mut held = false;
-    loop {
+    let mut held: Option<Picture> = None;
+    while !signal::has_come() {
         link.wait(WAIT).map_err(|error| error.to_string())?;
         for _ in 0..BATCH {
-            let Some(stamped) = link.take() else { break };
-            monitor.record(&record(&stamped));
+            let Some(arrival) = link.next_arrival() else {
+                break;
+            };
+            if let Some(record) = record(&arrival, Interface::CAN0) {
+                monitor.record(&record);
+            }
         }
         monitor.tick(microseconds(SystemTime::now()));
-        if !held && drawn.is_none_or(|drawn| drawn.elapsed() >= REFRESH) {
-            drawn = Some(Instant::now());
-            terminal
-                .draw(|frame| monitor.draw(frame))
-                .map_err(on_screen)?;
-        }
         while event::poll(Duration::ZERO).map_err(on_screen)? {
             match event::read().map_err(on_screen)? {
                 Event::Key(key) if key.kind == KeyEventKind::Press => match key.code {
@@ -69,26 +73,34 @@ fn watch(
                     KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => {
                         return Ok(());
                     }
-                    KeyCode::Char(' ') => held = !held,
+                    KeyCode::Char(' ') => {
+                        held = match held {
+                            Some(_) => None,
+                            None => Some(monitor.picture()),
+                        };
+                    }
+                    // A page that was turned is drawn at once.
+                    key if view.key(key) => drawn = None,
                     _ => {}
                 },
+                Event::Resize(..) => drawn = None,
                 _ => {}
             }
         }
+        if drawn.is_none_or(|drawn| drawn.elapsed() >= REFRESH) {
+            drawn = Some(Instant::now());
+            let newest;
+            let picture = match &held {
+                Some(picture) => picture,
+                None => {
+                    newest = monitor.picture();
+                    &newest
+                }
+            };
+            terminal
+                .draw(|frame| picture.draw(&mut view, frame))
+                .map_err(on_screen)?;
+        }
     }
-}
-
-fn record(stamped: &Stamped) -> Record {
-    Record {
-        time_us: microseconds(stamped.at),
-        interface: Interface::CAN0,
-        direction: None,
-        entry: Entry::Frame(stamped.frame),
-    }
-}
-
-/// Since 1970.
-fn microseconds(time: SystemTime) -> u64 {
-    time.duration_since(UNIX_EPOCH)
-        .map_or(0, |since| since.as_micros() as u64)
+    Ok(())
 }

@@ -20,9 +20,10 @@ use trace::{Interface, Record};
 
 use super::run::load;
 use super::show;
+use super::signal::end_on_signal;
 use args::{CheckArgs, ConvertArgs, DecodeArgs, FormatChoice, PlotArgs, ReplayArgs, StatsArgs};
 use sink::{Records, each, refuse_same, written};
-use source::{Source, finish_on_signal};
+use source::Source;
 
 /// Subcommands of `trace`.
 #[derive(Subcommand)]
@@ -60,7 +61,7 @@ fn decode(args: &DecodeArgs) -> Result<ExitCode, String> {
         FormatChoice::Jsonl => Format::JsonLines,
     };
     refuse_same(&args.input.file, args.out.as_deref())?;
-    finish_on_signal()?;
+    end_on_signal()?;
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     written(args.out.as_deref(), |sink| {
         let mut decoder = Decoder::new(sink, format)?;
@@ -73,7 +74,7 @@ fn decode(args: &DecodeArgs) -> Result<ExitCode, String> {
 fn convert(args: &ConvertArgs) -> Result<ExitCode, String> {
     let (target, end) = args.goals()?;
     refuse_same(&args.input.file, args.out.as_deref())?;
-    finish_on_signal()?;
+    end_on_signal()?;
     let mut source = Source::open(&args.input.file, args.input.selection(end))?;
     written(args.out.as_deref(), |sink| {
         let mut converter = Converter::new(sink, target)?;
@@ -104,7 +105,7 @@ impl<W: Write> Records for Converter<W> {
 }
 
 fn stats(args: &StatsArgs) -> Result<ExitCode, String> {
-    finish_on_signal()?;
+    end_on_signal()?;
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     let mut gatherer = Gatherer::new(args.bitrate);
     if let Some(longest) = args.skip_gaps {
@@ -128,7 +129,7 @@ fn stats(args: &StatsArgs) -> Result<ExitCode, String> {
 
 fn plot(args: &PlotArgs) -> Result<ExitCode, String> {
     refuse_same(&args.input.file, args.out.as_deref())?;
-    finish_on_signal()?;
+    end_on_signal()?;
     let arm = ArmModel::from(&load(args.model.as_ref())?);
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     let title = args.input.file.display().to_string();

@@ -35,7 +35,7 @@ pub use error::LinkError;
 pub use slcan_hub::{Clients, SlcanHub};
 pub use slcan_port::SlcanPort;
 pub use socketcan::SocketCan;
-pub use stamped::Stamped;
+pub use stamped::{Arrival, Event, Stamped};
 
 use protocol::bus::{Bus, Transmit, TransmitError};
 use protocol::frame::CanFrame;
@@ -68,6 +68,18 @@ impl Link {
         }
     }
 
+    /// As [`Link::open`], for a program that looks at everything: [`Link::next_arrival`] also gives error frames, and
+    /// bursts find room.
+    ///
+    /// # Errors
+    /// See [`LinkError`].
+    pub fn watch(address: &LinkAddress) -> Result<Self, LinkError> {
+        match address {
+            LinkAddress::SocketCan(interface) => SocketCan::watch(interface).map(Self::SocketCan),
+            LinkAddress::Slcan(_) => Self::open(address),
+        }
+    }
+
     /// Waits until a frame can be taken or `timeout` has passed; `true` if there is a frame. A signal ends the wait
     /// early, like a timeout.
     ///
@@ -91,6 +103,25 @@ impl Link {
             Self::SocketCan(link) => link.take(),
             Self::Slcan(link) => link.take(),
             Self::SlcanHub(link) => link.take(),
+        }
+    }
+
+    /// The oldest frame or error frame received and not yet taken.
+    pub fn next_arrival(&mut self) -> Option<Arrival> {
+        match self {
+            Self::SocketCan(link) => link.next_arrival(),
+            Self::Slcan(_) | Self::SlcanHub(_) => self.take().map(Arrival::from),
+        }
+    }
+
+    /// Frames that arrived and cannot be taken: the kernel had no room for them, or their lines could not be parsed.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        match self {
+            Self::SocketCan(link) => link.lost(),
+            Self::Slcan(link) => link.unreadable(),
+            // A client is told by BEL.
+            Self::SlcanHub(_) => 0,
         }
     }
 

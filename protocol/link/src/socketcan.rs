@@ -1,15 +1,16 @@
 //! SocketCAN: any CAN interface of Linux, virtual or hardware.
 
+mod received;
+
 use std::fs;
 use std::io;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
-use ::socketcan::{
-    CanAnyFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Frame as _, Socket, SocketOptions,
-};
+use ::socketcan::{CanFdFrame, CanFdSocket, EmbeddedFrame, Socket, SocketOptions};
 use rustix::io::Errno;
+use rustix::net::sockopt::{set_socket_recv_buffer_size, set_socket_recv_buffer_size_force};
 
-use super::{LinkError, Stamped, poll_for};
+use super::{Arrival, Event, LinkError, Stamped, poll_for};
 use protocol::bus::TransmitError;
 use protocol::frame::{CanFrame, FrameKind};
 
@@ -22,6 +23,10 @@ const CANFD_MTU: u32 = 72;
 /// Error classes that report whether the controller takes part in the bus (`linux/can/error.h`).
 const CAN_ERR_BUSOFF: u32 = 0x40;
 const CAN_ERR_RESTARTED: u32 = 0x100;
+/// All classes of errors there are.
+const CAN_ERR_MASK: u32 = 0x1FFF_FFFF;
+/// Room for received frames where none may be lost, bytes: a second of the fastest bus.
+const BURST: usize = 16 << 20;
 
 /// A socket on a CAN interface. Local loopback stays on, so that other programs on this machine see its frames; it
 /// does not receive its own.
@@ -30,6 +35,8 @@ pub struct SocketCan {
     socket: CanFdSocket,
     interface: String,
     bus_off: bool,
+    /// Frames for which the kernel had no room, as its counter of 32 bits has it.
+    lost: u32,
     pub(super) failure: Option<LinkError>,
 }
 
@@ -62,8 +69,27 @@ impl SocketCan {
             socket,
             interface: name(),
             bus_off: false,
+            lost: 0,
             failure: None,
         })
+    }
+
+    /// As [`Self::open`], with all error frames and with room for bursts.
+    pub(super) fn watch(interface: &str) -> Result<Self, LinkError> {
+        let link = Self::open(interface)?;
+        let failed = |source| LinkError::io(format!("open {interface}"), source);
+        link.socket.set_error_filter(CAN_ERR_MASK).map_err(failed)?;
+        // More than the system's limit is root's to ask for; everybody else gets the limit.
+        if set_socket_recv_buffer_size_force(&link.socket, BURST).is_err() {
+            set_socket_recv_buffer_size(&link.socket, BURST)
+                .map_err(|error| failed(error.into()))?;
+        }
+        Ok(link)
+    }
+
+    /// Frames for which the kernel had no room.
+    pub(super) fn lost(&self) -> u64 {
+        self.lost.into()
     }
 
     pub(super) fn ready(&mut self, timeout: Duration) -> Result<bool, LinkError> {
@@ -73,29 +99,34 @@ impl SocketCan {
 
     pub(super) fn take(&mut self) -> Option<Stamped> {
         loop {
-            let (frame, at) = match self.socket.read_frame_with_timestamps() {
-                Ok((frame, times)) => (frame, times.socket.unwrap_or_else(SystemTime::now)),
+            let Arrival { event, at } = self.next_arrival()?;
+            if let Event::Frame(frame) = event {
+                return Some(Stamped { frame, at });
+            }
+        }
+    }
+
+    pub(super) fn next_arrival(&mut self) -> Option<Arrival> {
+        loop {
+            let received = match received::receive(&self.socket) {
+                Ok(received) => received,
                 Err(error) => {
                     self.classify(&error, "read from");
                     return None;
                 }
             };
-            match &frame {
-                CanAnyFrame::Error(error) => {
-                    let class = error.id_word();
-                    if class & CAN_ERR_BUSOFF != 0 {
-                        self.bus_off = true;
-                    }
-                    if class & CAN_ERR_RESTARTED != 0 {
-                        self.bus_off = false;
-                    }
-                }
-                _ => {
-                    if let Some(frame) = from_socketcan(&frame) {
-                        return Some(Stamped { frame, at });
-                    }
-                }
+            self.lost = received.lost.unwrap_or(self.lost);
+            let Some(event) = received.event else {
+                continue;
+            };
+            if let Event::Error { class, .. } = event {
+                self.bus_off |= class & CAN_ERR_BUSOFF != 0;
+                self.bus_off &= class & CAN_ERR_RESTARTED == 0;
             }
+            return Some(Arrival {
+                event,
+                at: received.at,
+            });
         }
     }
 
@@ -157,18 +188,9 @@ fn open_socket(interface: &str) -> io::Result<CanFdSocket> {
     socket.set_loopback(true)?;
     socket.set_recv_own_msgs(false)?;
     socket.set_recv_timestamp(true)?;
+    received::count_lost(&socket)?;
     socket.set_error_filter(CAN_ERR_BUSOFF | CAN_ERR_RESTARTED)?;
     Ok(socket)
-}
-
-fn from_socketcan(frame: &CanAnyFrame) -> Option<CanFrame> {
-    match frame {
-        CanAnyFrame::Normal(frame) => CanFrame::from_embedded(frame),
-        CanAnyFrame::Remote(frame) => CanFrame::from_embedded(frame),
-        CanAnyFrame::Fd(frame) => CanFrame::fd(frame.id(), frame.data(), frame.is_brs())
-            .map(|fd| fd.with_esi(frame.is_esi())),
-        CanAnyFrame::Error(_) => None,
-    }
 }
 
 /// A numeric property of an interface, decimal or hexadecimal.

@@ -5,6 +5,7 @@ frames faster than programs read them, so each receiver gets room for all of the
 """
 
 import fcntl
+import glob
 import os
 import pty
 import random
@@ -40,7 +41,10 @@ def main():
     for log in (TRACE, mixed):
         ours_to_candump_and_python_can(log)
     python_can_to_ours(trace)
+    signals_to_monitor()
     cansend_to_ours()
+    canplayer_to_record(mixed)
+    losses_of_record()
     slcand_to_ours_and_back()
 
 
@@ -75,6 +79,13 @@ def python_can_to_ours(trace):
     print(f"ok: python-can sends {len(trace)} frames, the monitor counts them, none bad, none lost")
 
 
+def signals_to_monitor():
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        with Monitor() as monitor:
+            monitor.end = lambda: os.kill(monitor.pid, number)
+    print("ok: Ctrl-C, SIGTERM and SIGHUP leave the terminal as it was")
+
+
 def cansend_to_ours():
     with Controller("socketcan:vcan0") as controller, Candump("vcan0", "controller.log") as candump:
         controller.await_line("waiting for the drives")
@@ -85,6 +96,47 @@ def cansend_to_ours():
         # CiA 301 puts the emergency error code first, low byte first; 9000h is an external error.
         candump.await_frame(lambda frame: frame[0] == 0x0C1 and frame[-1][:2] == b"\x00\x90")
     print("ok: cansend resets and stops the controller, candump sees its emergency")
+
+
+def canplayer_to_record(log):
+    """Every kind of frame, played by canplayer, recorded into files by size; SIGTERM ends the last."""
+    frames = read_log(log)
+    with Recorder("played.log", "--rotate", "10k") as recorder:
+        subprocess.run(["canplayer", "-g", "0", "-I", log, "vcan0=can0"], check=True)
+        await_true("the recording", lambda: sum(lines(path) for path in recorder.files()) == len(frames))
+        recorder.end(signal.SIGTERM)
+    assert recorder.status == 0, recorder.status
+    assert recorder.said.startswith(f"{len(frames)} frames and 0 error frames"), recorder.said
+    files = recorder.files()
+    assert len(files) > 2 and not any(path.endswith(".part") for path in files), files
+    recorded = [frame for path in files for frame in read_log(path)]
+    assert recorded == frames, "the recording holds other frames than canplayer sent"
+    print(f"ok: record has the {len(frames)} frames of canplayer, in {len(files)} files")
+
+
+def losses_of_record():
+    """More frames than its socket has room for, while it is stopped: what is recorded and what is lost is what was sent."""
+    sent = 200_000
+    with Recorder("stopped.log") as recorder:
+        recorder.process.send_signal(signal.SIGSTOP)
+        subprocess.run(["cangen", "vcan0", "-g", "0", "-n", str(sent), "-I", "123", "-L", "8", "-i"], check=True)
+        recorder.process.send_signal(signal.SIGCONT)
+        # The kernel says with a frame how many were lost before it; this one is lost, too, as long as there is no room.
+        [file] = recorder.files()
+
+        def heard():
+            cansend("vcan0", "124#")
+            return " 124#" in open(file).read()[-10_000:]
+
+        after = 1
+        while not heard():
+            after += 1
+            time.sleep(0.05)
+        recorder.end(signal.SIGINT)
+    recorded = int(recorder.said.split()[0])
+    lost = int(recorder.complaint.split(": ")[-2].split()[0])
+    assert recorder.status == 1 and recorded + lost == sent + after and recorded < sent, (recorder.status, recorded, lost)
+    print(f"ok: record names the {lost} frames of {sent} for which a stopped program has no room")
 
 
 def slcand_to_ours_and_back():
@@ -165,14 +217,16 @@ class Monitor:
     """plant-sim monitor on a terminal of its own."""
 
     def __init__(self):
-        self.screen = pyte.Screen(160, 50)
+        # The smallest terminal there is.
+        self.screen = pyte.Screen(80, 24)
+        self.bytes = b""
 
     def __enter__(self):
         before = sockets("vcan0")
         pid, self.terminal = pty.fork()
         if pid == 0:
             # The size is asked for once, at the start.
-            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 50, 160, 0, 0))
+            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
             os.environ["TERM"] = "xterm-256color"
             os.execv(PLANT_SIM, [PLANT_SIM, "monitor", "--bus", "socketcan:vcan0"])
         self.pid = pid
@@ -191,11 +245,17 @@ class Monitor:
             if not data:
                 return
             stream.feed(data)
+            self.bytes += data
+
+    def end(self):
+        os.write(self.terminal, b"q")
 
     def __exit__(self, *_):
-        os.write(self.terminal, b"q")
+        self.end()
         _, status = os.waitpid(self.pid, 0)
         assert status == 0, f"monitor ended with {status}"
+        # Back from the alternate screen, the cursor shown.
+        await_true("the terminal as it was", lambda: b"\x1b[?1049l" in self.bytes and b"\x1b[?25h" in self.bytes)
 
     def expect(self, frames):
         """All frames counted, and on every identifier none lost and none bad: the checksums are right."""
@@ -206,6 +266,33 @@ class Monitor:
             if len(words) > 6 and words[0] in ("1C0", "240", "300", "641", "5C1", "741"):
                 rows[words[0]] = words[5:7]
         assert len(rows) == 6 and all(row == ["0", "0"] for row in rows.values()), rows
+
+
+class Recorder:
+    """plant-sim record of vcan0."""
+
+    def __init__(self, name, *options):
+        self.name, self.options = name, options
+
+    def __enter__(self):
+        before = sockets("vcan0")
+        self.process = subprocess.Popen(
+            [PLANT_SIM, "record", "--bus", "socketcan:vcan0", "--out", f"{WORK}/{self.name}", *self.options],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        await_true("record", lambda: sockets("vcan0") > before)
+        return self
+
+    def end(self, number):
+        self.process.send_signal(number)
+        self.said, self.complaint = self.process.communicate(timeout=LIMIT)
+        self.status = self.process.returncode
+
+    def __exit__(self, *_):
+        self.process.kill()
+
+    def files(self):
+        """Complete or growing, in order."""
+        return sorted(glob.glob(f"{WORK}/{self.name.removesuffix('.log')}*"))
 
 
 def python_can():

@@ -16,9 +16,10 @@ use sim::scenario;
 use trace::Interface;
 
 use super::args::{CheckArgs, ReplayArgs};
-use super::source::{Source, finish_on_signal};
+use super::source::Source;
 use crate::cli::run::load;
 use crate::cli::show;
+use crate::cli::signal::end_on_signal;
 
 /// A wait of the player that is worth a word.
 const LONG: Duration = Duration::from_secs(1);
@@ -36,7 +37,7 @@ fn place<T>(source: &Source, interface: Interface, all: &PerInterface<T>) -> Str
 }
 
 pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, String> {
-    finish_on_signal()?;
+    end_on_signal()?;
     let arm = ArmModel::from(&load(args.model.as_ref())?);
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     let mut checkers: PerInterface<Checker> = BTreeMap::new();
@@ -71,7 +72,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
     if let Some(bus) = &args.bus {
         return play(args, bus);
     }
-    finish_on_signal()?;
+    end_on_signal()?;
     scenario::check_rate(args.rate)
         .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
     let model: RobotModel = load(args.model.as_ref())?;

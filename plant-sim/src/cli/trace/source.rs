@@ -5,15 +5,16 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::os::fd::AsFd;
 use std::path::Path;
-use std::process::{self, ExitCode};
+use std::process::ExitCode;
 use std::rc::Rc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use flate2::read::MultiGzDecoder;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use trace::select::Selection;
 use trace::{Problem, ReadError, Reader, Record};
+
+use crate::cli::signal;
 
 /// Unreadable lines that are shown; of more, only the number is.
 const SHOWN: u64 = 10;
@@ -28,22 +29,6 @@ const WATCH: Timespec = Timespec {
 const GZIP: &[u8] = b"\x1F\x8B";
 /// Exit code where there was nothing to judge: neither good (0) nor bad (1).
 const NOTHING_JUDGED: u8 = 3;
-/// Exit code of a process that its second Ctrl-C ended.
-const INTERRUPTED: i32 = 130;
-
-/// Whether a signal has asked for the end.
-static STOP: AtomicBool = AtomicBool::new(false);
-
-/// From now on a signal (Ctrl-C, SIGTERM) ends the trace as if its file ended, so that what was gathered until then is
-/// shown. A second one ends the process.
-pub(super) fn finish_on_signal() -> Result<(), String> {
-    ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            process::exit(INTERRUPTED);
-        }
-    })
-    .map_err(|error| format!("cannot take signals: {error}"))
-}
 
 /// A trace that is read from front to end, with its progress on standard error.
 pub(super) struct Source {
@@ -71,7 +56,7 @@ struct Counted {
 impl Read for Counted {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
-            if STOP.load(Ordering::Relaxed) {
+            if signal::has_come() {
                 return Ok(0);
             }
             let mut input = [PollFd::new(&self.input, PollFlags::IN)];
@@ -145,7 +130,7 @@ impl Source {
                         return Some(Ok(record));
                     }
                 }
-                Err(_) if STOP.load(Ordering::Relaxed) => return None,
+                Err(_) if signal::has_come() => return None,
                 Err(ReadError::Line {
                     problem: problem @ Problem::Unterminated,
                     ..
