@@ -221,7 +221,7 @@ fn a_clock_that_was_set_is_named_and_can_be_left_out() {
     let log = "(10.0) can0 123#\n(10.1) can0 123#\n(1720000000.0) can0 123#\n(1720000000.1) can0 123#\n(9.0) can0 123#\n";
     let (_, text, _) = trace("clock.log", log, &["stats"]);
     assert!(
-        text.contains("largest step from a record to the next is 1719999989.900000 s"),
+        text.contains("largest step between two records is 1719999989.900000 s"),
         "{text}"
     );
     assert!(
