@@ -1,10 +1,10 @@
-//! Version and commit for `--version`, of `plant-sim` and of the controller on a host:
-//! `0.1.0 (abc1234, 2026-11-28)`, with `modified` where the sources are not those of the commit.
+//! Version and commit for `--version` of `plant-sim` and of the controller on a host:
+//! `0.1.0 (abc1234, 2026-11-28)`, with `modified` where the sources differ from the commit.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What goes into the programs, from the root of the repository.
+/// Sources of the programs, from the root of the repository.
 const SOURCES: [&str; 5] = [
     "protocol",
     "firmware",
@@ -20,12 +20,12 @@ fn main() {
     println!("cargo:rustc-env=COMMIT={commit}");
     println!("cargo:rustc-env=VERSION_AND_COMMIT={version} ({commit})");
     let sources = SOURCES.map(|source| root.join(source));
-    // HEAD moves with a checkout, its log with every commit.
+    // HEAD changes with a checkout, its log with every commit.
     let heads = ["HEAD", "logs/HEAD"]
         .into_iter()
         .filter_map(|file| git(&root, &["rev-parse", "--git-path", file]))
         .map(|file| root.join(file));
-    // Cargo takes a file that is not there for one that has changed.
+    // Cargo treats a missing file as changed.
     for file in sources
         .into_iter()
         .chain(heads)
@@ -35,7 +35,7 @@ fn main() {
     }
 }
 
-/// The folder that holds the workspace.
+/// The folder of the workspace.
 fn root() -> PathBuf {
     let mut folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     while !folder.join("Cargo.lock").exists() {
@@ -44,7 +44,7 @@ fn root() -> PathBuf {
     folder.into()
 }
 
-/// Commit and its date; none without git, or where the sources are no repository or lie inside of another one.
+/// Commit and its date; none without git, or if the sources are not a repository or are inside another one.
 fn commit(root: &Path) -> Option<String> {
     let top = git(root, &["rev-parse", "--show-toplevel"])?;
     if Path::new(&top).canonicalize().ok()? != root.canonicalize().ok()? {

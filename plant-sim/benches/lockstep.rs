@@ -1,6 +1,6 @@
-//! How much faster than real time the whole loop runs in lock-step, on one core.
+//! Speed of the whole loop in lock-step relative to real time, on one core.
 //!
-//! `cargo bench -p plant-sim` reports samples a second; at 1 kHz a thousand of them are real time.
+//! `cargo bench -p plant-sim` reports samples per second; at 1 kHz, 1000 is real time.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use plant_sim::run::execute;

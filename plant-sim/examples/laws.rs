@@ -1,6 +1,6 @@
 //! The table of docs/motion.md: every control law on the gate, with the right and a wrong model.
 //!
-//! Arguments are control rates in Hz; without one it is 1000.
+//! Arguments are control rates in Hz; default 1000.
 
 use sim::run::in_process;
 use sim::scenario::Scenario;

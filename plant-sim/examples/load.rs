@@ -1,4 +1,4 @@
-//! Worst-case load of the bus by control rate, as docs/protocol.md shows it.
+//! Worst-case load of the bus by control rate, for docs/protocol.md.
 
 use protocol::wire::BitTiming;
 use sim::bus::{MAX_LOAD, Overload};

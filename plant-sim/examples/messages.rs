@@ -1,4 +1,4 @@
-//! The messages of the link, as docs/protocol.md shows them.
+//! The messages of the link, for docs/protocol.md.
 
 use protocol::messages::Node;
 use protocol::schema::Rate;

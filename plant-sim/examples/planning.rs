@@ -1,4 +1,4 @@
-//! Time from a move's request to its answer, which is how long planning takes, as docs/motion.md shows it.
+//! Time from a move's request to its answer, which is the time of planning, for docs/motion.md.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use sim::run::in_process;
 use sim::scenario::Scenario;
 use sim::setup::RunConfig;
 
-/// Requests that wait for their answer, and the answers' delays by kind of move.
+/// Requests without an answer yet, and the delays of answers by kind of move.
 #[derive(Default)]
 struct Answers {
     asked: BTreeMap<u8, (Instant, &'static str)>,

@@ -1,10 +1,10 @@
-//! The one place that writes SVG: a page, and what the pictures of traces and timings are drawn with.
+//! The only module that writes SVG: a page, and the elements of the pictures of traces and timings.
 //!
-//! Places are in units of the page, right and down. A `style` is attributes as SVG has them.
+//! Positions are in units of the page, right and down. A `style` is a list of SVG attributes.
 
 use std::fmt::Write as _;
 
-/// A picture that grows by one element at a time.
+/// A picture that grows element by element.
 pub(crate) struct Svg(String);
 
 impl Svg {
@@ -20,17 +20,17 @@ impl Svg {
         page
     }
 
-    /// What is drawn until [`Svg::end_group`] is moved down by `top`.
+    /// Everything drawn until [`Svg::end_group`] is moved down by `top`.
     pub(crate) fn begin_group(&mut self, top: f64) {
         self.line(format_args!(r#"<g transform="translate(0 {top:.1})">"#));
     }
 
-    /// Ends what [`Svg::begin_group`] has begun.
+    /// Ends the group of [`Svg::begin_group`].
     pub(crate) fn end_group(&mut self) {
         self.line(format_args!("</g>"));
     }
 
-    /// Writing that begins at `x`, or ends or is centred there where the style has another `text-anchor`.
+    /// Text that begins at `x`, or ends or is centred there if the style has another `text-anchor`.
     pub(crate) fn text(&mut self, x: f64, y: f64, style: &str, content: &str) {
         let content = escape(content);
         self.line(format_args!(
@@ -45,7 +45,7 @@ impl Svg {
         ));
     }
 
-    /// The same with a name that is shown when pointed at.
+    /// The same with a name shown as a tooltip.
     pub(crate) fn named_rectangle(
         &mut self,
         [x, y, width, height]: [f64; 4],
@@ -68,7 +68,7 @@ impl Svg {
         self.path(&format!("M{x:.1} {from:.1}V{to:.1}"), style);
     }
 
-    /// A vertical line with a name that is shown when pointed at.
+    /// A vertical line with a name shown as a tooltip.
     pub(crate) fn named_down(&mut self, x: f64, from: f64, to: f64, style: &str, name: &str) {
         let name = escape(name);
         self.line(format_args!(
@@ -81,7 +81,7 @@ impl Svg {
         self.line(format_args!(r#"<path d="{commands}" {style}/>"#));
     }
 
-    /// A line through points, `x,y` with blanks between.
+    /// A line through points, `x,y` separated by blanks.
     pub(crate) fn polyline(&mut self, points: &str, style: &str) {
         self.line(format_args!(
             r#"<polyline points="{points}" fill="none" {style}/>"#
@@ -135,7 +135,7 @@ fn escape(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// Elements of a document in their order, each as name and attributes; panics if tags are not closed as XML wants.
+/// Elements of a document in their order, each as name and attributes; panics if tags are not closed as in XML.
 #[cfg(test)]
 pub(crate) fn elements(svg: &str) -> Vec<(String, std::collections::BTreeMap<String, f64>)> {
     let mut open = Vec::new();

@@ -2,12 +2,12 @@
 //!
 //! - Time does not run backwards.
 //! - Every known frame is one that the codec accepts: format, length, CRC, codes, ranges.
-//! - Every end-to-end counter counts one up; so does the sample number of the feedback. A node that network management
-//!   resets starts anew.
-//! - A command echoes the newest feedback, and no feedback waits for its command until the next.
-//! - No message that comes at a rate stays away for longer than two and a half periods, no feedback for longer than the
+//! - Every end-to-end counter increments by one; so does the sample number of the feedback. A node that network
+//!   management resets starts anew.
+//! - A command echoes the newest feedback, and every feedback is answered before the next one.
+//! - No periodic message is missing for longer than two and a half periods, no feedback for longer than the
 //!   controller's watchdog.
-//! - No torque is asked for without torque enabled, and none beyond the limits of the motors.
+//! - No torque is commanded without torque enabled, and none beyond the limits of the motors.
 //!
 //! Foreign identifiers and error frames are counted, not judged.
 
@@ -21,8 +21,8 @@ use protocol::table::{self, TABLE};
 
 use trace::{Entry, Record};
 
-/// Age at which the frames of every sample count as silent, us: what docs/safety.md promises, written again, so that the
-/// judge does not ask the accused.
+/// Age at which the frames of every sample count as silent, us: the value of docs/safety.md, written again so
+/// that the check does not depend on the code under test.
 const SILENCE_US: u64 = 100_000;
 
 /// The first rule that a trace breaks.
@@ -42,25 +42,25 @@ pub enum Offence {
         /// Why.
         error: DecodeError,
     },
-    /// The counter does not count one up.
+    /// The counter does not increment by one.
     #[error("{message}: counter {counter} {}", sequence(*verdict))]
     Counter {
         /// Message.
         message: &'static str,
         /// Counter of the frame.
         counter: u8,
-        /// What it says.
+        /// Verdict on the counter.
         verdict: Verdict,
     },
-    /// The sample number does not count one up.
-    #[error("Feedback: sample {found} where {expected} is due")]
+    /// The sample number does not increment by one.
+    #[error("Feedback: sample {found} instead of {expected}")]
     Sample {
         /// Number of the frame.
         found: u32,
-        /// Number after that of the frame before.
+        /// Number expected after the previous frame.
         expected: u32,
     },
-    /// A command that answers nothing.
+    /// A command without feedback to answer.
     #[error("Command: echoes sample {found} before any feedback")]
     NoFeedback {
         /// Sample echoed.
@@ -75,18 +75,18 @@ pub enum Offence {
         newest: u32,
     },
     /// A sample was answered twice.
-    #[error("Command: sample {sample} has been answered already")]
+    #[error("Command: sample {sample} has already been answered")]
     Twice {
         /// Sample echoed.
         sample: u32,
     },
     /// A sample was not answered.
-    #[error("Feedback: no command has answered sample {sample} before")]
+    #[error("Feedback: no command has answered the previous sample {sample}")]
     Unanswered {
         /// Sample without answer.
         sample: u32,
     },
-    /// A message stayed away.
+    /// A message is missing.
     #[error("{message}: none for {age_us} us; {limit_us} us are allowed")]
     Age {
         /// Message.
@@ -101,7 +101,7 @@ pub enum Offence {
     TorqueDisabled {
         /// Motor, 0 to 3.
         motor: usize,
-        /// Torque asked for, N m.
+        /// Torque commanded, N m.
         torque: f32,
     },
     /// Torque beyond a motor's limit.
@@ -109,7 +109,7 @@ pub enum Offence {
     TorqueLimit {
         /// Motor, 0 to 3.
         motor: usize,
-        /// Torque asked for, N m.
+        /// Torque commanded, N m.
         torque: f32,
         /// Limit of the motor, N m.
         limit: f32,
@@ -119,8 +119,8 @@ pub enum Offence {
 fn sequence(verdict: Verdict) -> String {
     match verdict {
         Verdict::Initial | Verdict::Fresh => "is the next".into(),
-        Verdict::Lost(frames) => format!("tells that {frames} frames are missing"),
-        Verdict::Duplicate => "comes a second time".into(),
+        Verdict::Lost(frames) => format!("shows that {frames} frames are missing"),
+        Verdict::Duplicate => "is a duplicate".into(),
         Verdict::Stale(frames) => format!("is {frames} frames older than the newest"),
     }
 }
@@ -136,12 +136,12 @@ pub struct Checker {
     counts: Counts,
 }
 
-/// How much was judged, and how much was not.
+/// Numbers of frames judged and not judged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Known frames.
     pub judged: u64,
-    /// Frames of identifiers that are not ours.
+    /// Frames with foreign identifiers.
     pub foreign: u64,
     /// Error frames.
     pub error_frames: u64,
@@ -158,7 +158,7 @@ impl Counts {
         }
     }
 
-    /// What was counted since `before`.
+    /// The counts since `before`.
     #[must_use]
     pub fn minus(self, before: Self) -> Self {
         Self {
@@ -203,7 +203,7 @@ impl Checker {
     /// Judges the next record.
     ///
     /// # Errors
-    /// The rule it breaks. What follows in the trace is judged as if it had not.
+    /// The rule that it breaks. The rest of the trace is judged as if it had not.
     pub fn record(&mut self, record: &Record) -> Result<(), Offence> {
         let time_us = record.time_us;
         if time_us < self.newest_us {
@@ -230,7 +230,7 @@ impl Checker {
         }
     }
 
-    /// What was judged so far.
+    /// Counts so far.
     #[must_use]
     pub fn counts(&self) -> Counts {
         self.counts
@@ -241,7 +241,7 @@ impl Checker {
             if let (Some(seen_us), Some(limit_us)) = (watch.seen_us, watch.limit_us)
                 && now_us - seen_us > limit_us
             {
-                // Reported once; the next frame begins anew.
+                // Reported once; the next frame starts anew.
                 watch.seen_us = None;
                 return Err(Offence::Age {
                     message: watch.info.name,
@@ -287,7 +287,7 @@ impl Checker {
         }
     }
 
-    /// The node of this number, or every one for 0, starts again: with its counters at their start, and in its own time.
+    /// The node of this number, or every node for 0, restarts: its counters start anew, and it may take its time.
     fn reset(&mut self, node: u8) {
         let is_it = |sender: Node| node == 0 || node == sender.code();
         for watch in &mut self.messages {
@@ -315,7 +315,7 @@ impl Checker {
         if found != expected {
             return Err(Offence::Sample { found, expected });
         }
-        // The drives may run before the controller does.
+        // The drives may start before the controller.
         if self.commanded && !answered {
             return Err(Offence::Unanswered { sample });
         }

@@ -1,4 +1,4 @@
-//! Faults of the controller on the emulated board, planted in mid-motion: what the pins, the drives and the bus show.
+//! Faults of the controller on the emulated board, planted in mid-motion: behaviour of pins, drives and bus.
 
 use std::cell::RefCell;
 use std::path::Path;
@@ -24,24 +24,25 @@ use sim::setup::RunConfig;
 const IN_MOTION: u32 = 100;
 /// Samples from the fault to the verdict: time for five heartbeats.
 const AFTERWARDS: u64 = 500;
-/// Samples until the drives have let go, at most: they hold the last command for some, and a frame is under way.
+/// Most samples until the drives have switched torque off: they hold the last command for some, and a frame may be in
+/// transmission.
 const LET_GO: u64 = HOLD_SAMPLES as u64 + 3;
 /// Fault status of an access that is not allowed, by an instruction or while stacking (CFSR: DACCVIOL, MSTKERR).
 const OUT_OF_STACK: u32 = 1 << 1 | 1 << 4;
-/// Speed below which the lift stands, m/s.
+/// Speed below which the lift counts as at rest, m/s.
 const STANDING: f64 = 1e-3;
 
-/// What is planted.
+/// A fault to plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Planted {
     /// By the image itself.
     Fault(Fault),
-    /// By network management, which every image obeys, its frames on this channel.
+    /// A reset by network management, which every image obeys, with frames on this channel.
     Reset(Channel),
 }
 
 impl Planted {
-    /// Everything that can be planted.
+    /// All faults that can be planted.
     pub fn all() -> impl Iterator<Item = Self> {
         Fault::ALL
             .into_iter()
@@ -58,7 +59,7 @@ impl Planted {
         }
     }
 
-    /// Reason that the controller has to give.
+    /// Reason that the controller has to report.
     fn reason(self) -> ResetReason {
         match self {
             Self::Fault(Fault::Panic) => ResetReason::Panic,
@@ -67,7 +68,7 @@ impl Planted {
         }
     }
 
-    /// Bits of the fault status of which one has to be set.
+    /// Bits of the fault status, one of which has to be set.
     fn status(self) -> u32 {
         match self {
             Self::Fault(Fault::StackOverflow | Fault::OverflowInInterrupt) => OUT_OF_STACK,
@@ -77,10 +78,10 @@ impl Planted {
     }
 }
 
-/// What was seen of one fault.
+/// Observations of one fault.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seen {
-    /// What the board reported after its restart.
+    /// Report of the board after its restart.
     pub stop: Option<Stop>,
     /// Reasons in the heartbeats since.
     pub reasons: Vec<ResetReason>,
@@ -88,16 +89,16 @@ pub struct Seen {
     pub mode: Option<Mode>,
     /// Samples until the drives had no torque and the brake was closing, for good.
     pub let_go: Option<u64>,
-    /// Whether the lift's brake was closed in the end.
+    /// Whether the lift's brake was closed at the end.
     pub braked: bool,
-    /// Speed of the lift in the end, m/s. The other axes have no brake: they coast.
+    /// Speed of the lift at the end, m/s. The other axes have no brake: they coast.
     pub lift: f64,
-    /// The log, of before and after.
+    /// The log, before and after.
     pub log: String,
 }
 
 impl Seen {
-    /// What is not as it has to be after `planted`; nothing if all is well.
+    /// Deviations from the required behaviour after `planted`; empty if there are none.
     pub fn wrong(&self, planted: Planted) -> Vec<String> {
         let reason = planted.reason();
         let stop = self.stop.as_ref();
@@ -106,7 +107,7 @@ impl Seen {
         [
             (
                 stop.is_none_or(|stop| stop.pins != [RUNNING, TORQUE_OFF]),
-                "pins not as in motion before, or not as without torque after",
+                "pins not those of motion before, or not those without torque after",
             ),
             (
                 stop.is_none_or(|stop| stop.reason != reason),
@@ -126,7 +127,7 @@ impl Seen {
             ),
             (
                 self.let_go.is_none_or(|samples| samples > LET_GO),
-                "drives under torque for too long",
+                "drives kept torque on for too long",
             ),
             (!self.braked, "brake open"),
             (self.lift.abs() > STANDING, "lift moving"),
@@ -142,10 +143,10 @@ impl Seen {
     }
 }
 
-/// Plants a fault in the middle of the first move of a scenario, and looks on for a while.
+/// Plants a fault in the middle of the first move of a scenario, and observes for a while.
 ///
 /// # Errors
-/// The run did not get that far, or the board did not start again.
+/// The run did not get that far, or the board did not restart.
 pub fn plant(config: &RunConfig, image: &Path, planted: Planted) -> Result<Seen, String> {
     let text = |error: &dyn std::error::Error| error.to_string();
     let rig = config.rig().map_err(|error| text(&error))?;
@@ -170,7 +171,7 @@ pub fn plant(config: &RunConfig, image: &Path, planted: Planted) -> Result<Seen,
             .map_err(|error| text(&error))?;
         if let Some(outcome) = rig.outcome() {
             let why = outcome.as_ref().err().map(ToString::to_string);
-            return Err(why.unwrap_or_else(|| "the arm never moved for long enough".into()));
+            return Err(why.unwrap_or_else(|| "the arm never moved long enough".into()));
         }
     }
     match planted {
@@ -181,7 +182,7 @@ pub fn plant(config: &RunConfig, image: &Path, planted: Planted) -> Result<Seen,
         Planted::Reset(_) => rig.inject(&peers::reset()),
     }
     watch.since = Some(0);
-    // The operator waits for the end of its move, and asks for nothing more.
+    // The operator waits for the end of its move and requests nothing more.
     for _ in 0..AFTERWARDS {
         rig.step(&mut (), &mut watch)
             .map_err(|error| text(&error))?;
@@ -194,7 +195,7 @@ pub fn plant(config: &RunConfig, image: &Path, planted: Planted) -> Result<Seen,
 /// Watches the bus and the arm.
 #[derive(Default)]
 struct Watch {
-    /// Samples in which the arm has been moving.
+    /// Samples for which the arm has been moving.
     moving: u32,
     /// Samples since the fault.
     since: Option<u64>,
@@ -254,7 +255,7 @@ mod tests {
         }
     }
 
-    /// Every single thing that can be wrong is, one at a time.
+    /// Each possible deviation, one at a time.
     #[test]
     fn whatever_is_not_as_it_has_to_be_is_named() {
         const PLANTED: Planted = Planted::Fault(Fault::StackOverflow);

@@ -1,7 +1,7 @@
-//! The model's formulas as a filter over CSV: rows of states in, rows of results out.
+//! The formulas of the models as a filter over CSV: rows of states in, rows of results out.
 //!
 //! Column names are those of the reference tables in `tests/reference`, so that a table can be piped through and
-//! compared. Its result columns may stand in the input and are ignored.
+//! compared. Result columns in the input are ignored.
 
 mod cell;
 mod controller;
@@ -49,13 +49,13 @@ pub enum EvalError {
     Read {
         /// First line that could not be read.
         line: usize,
-        /// What the system says.
+        /// Error of the operating system.
         cause: io::Error,
     },
     /// The output cannot be written.
     #[error("cannot write the output: {0}")]
     Write(io::Error),
-    /// The controller's arithmetic does not stand this model.
+    /// The controller cannot use this model.
     #[error("the controller refuses the model: {0}")]
     Model(firmware::mechanics::arm::ModelError),
     /// A column that the table does not have.
@@ -72,7 +72,7 @@ pub enum EvalError {
         /// Its name.
         column: String,
     },
-    /// An input column that is not there.
+    /// A missing input column.
     #[error("line 1: column {column} is missing; required are {required}")]
     MissingColumn {
         /// Its name.
@@ -80,7 +80,7 @@ pub enum EvalError {
         /// Names of all input columns of the table.
         required: String,
     },
-    /// A cell that is empty, or holds something else than a number.
+    /// A cell that is empty or not a number.
     #[error(
         "line {line}, column {column}: found {found:?}; allowed: a finite number of magnitude up to {max:e}"
     )]
@@ -89,7 +89,7 @@ pub enum EvalError {
         line: usize,
         /// Name of the column.
         column: String,
-        /// What the cell holds.
+        /// Content of the cell.
         found: String,
         /// Largest number that the implementation can represent.
         max: f64,
@@ -106,10 +106,11 @@ pub enum EvalError {
     },
 }
 
-/// Reads rows of the input columns of `table` and writes, for each, its result columns as computed `by` one
-/// implementation, in front of them the labels (`id`, `kind`, `payload`) that the input has.
+/// Reads rows of the input columns of `table` and writes for each its result columns as computed `by` one
+/// implementation, preceded by the labels (`id`, `kind`, `payload`) in the input.
 ///
-/// Numbers are printed as the shortest decimals that read back as the same number, `nan` where there is none.
+/// Numbers are printed as the shortest decimals that read back as the same number, `nan` where there is no
+/// result.
 pub fn eval(
     table: Table,
     by: By,
@@ -166,7 +167,7 @@ pub fn eval(
     writer.flush().map_err(EvalError::Write)
 }
 
-/// The cells of one line. A table of numbers has no cell of several lines, so lines are split here and not by the CSV
+/// The cells of one line. A table of numbers has no multi-line cells, so lines are split here and not by the CSV
 /// reader: errors can then name their line. A blank line has no cells.
 fn split(line: &str) -> Vec<String> {
     let mut reader = csv::ReaderBuilder::new()

@@ -1,13 +1,13 @@
 //! A controller in another process or on a board, reached over a CAN link.
 //!
-//! The rig keeps its bit-timed bus: what that delivers to the controller goes out on the link, what the controller
-//! answers comes back and is put onto the bit-timed bus. Every frame of the run is therefore on the link for anybody to
-//! see, and the results are timed as on a wire even where the link is a virtual one.
+//! The rig keeps its bit-timed bus: frames delivered to the controller go out on the link, and the controller's answers
+//! are put onto the bit-timed bus. Every frame of the run is therefore visible on the link, and the results are timed
+//! as on a wire even if the link is virtual.
 //!
 //! - *Lock-step*: the plant waits for the answer. The controller counts time in samples
-//!   ([`SampleClock`](firmware::cabinet::sample_clock::SampleClock)), so a twin of it in this process, fed with the same frames,
-//!   must send the same frames; each is compared byte for byte.
-//! - *Real time*: samples are taken at absolute deadlines of the machine's clock. A command that is late acts late.
+//!   ([`SampleClock`](firmware::cabinet::sample_clock::SampleClock)), so a twin of it in this process
+//!   must send the same frames when given the same frames; each is compared byte for byte.
+//! - *Real time*: samples are taken at absolute deadlines of the machine's clock. A late command acts late.
 
 mod lock_step;
 mod measure;
@@ -35,15 +35,15 @@ pub use realtime::RealTime;
 pub use timing::{Distribution, Timing};
 pub use wall_clock::WallClock;
 
-/// Longest wait for an answer in lock-step. Only a controller that has stopped needs this long.
+/// Longest wait for an answer in lock-step. Only a stopped controller takes this long.
 const ANSWER_LIMIT: Duration = Duration::from_secs(2);
 
 /// The link, and the name of its bus.
 pub(crate) struct Remote {
     link: Link,
     bus: String,
-    /// Whether a controller has been met. From then on a lost link does not end the run: to the other nodes the controller
-    /// has fallen silent.
+    /// Whether a controller has been found. From then on a lost link does not end the run: to the other nodes the
+    /// controller has fallen silent.
     met: bool,
     /// Why the link failed.
     lost: Option<String>,
@@ -69,7 +69,7 @@ impl Remote {
             && let Err(error) = self.link.transmit(frame)
         {
             if error == TransmitError::Offline || Instant::now() >= limit {
-                // The link knows more than the frame that was not taken.
+                // The link has the underlying error.
                 self.wait(Duration::ZERO);
                 self.lose(format!("cannot be reached: {error}"));
             } else {
@@ -78,15 +78,16 @@ impl Remote {
         }
     }
 
-    /// A controller that starts while its twin moves the arm has died in between: nothing of the run is left in it.
+    /// Refuses a controller that starts while its twin moves the arm: it has died in between and lost the state of the
+    /// run.
     fn refuse_restart(&self, frame: &CanFrame, twin: &Node) -> Result<(), PeerError> {
         if is_starting(frame) && twin.controller().state().is_powered() {
-            return Err(self.error("has started again in the middle of the run"));
+            return Err(self.error("restarted in the middle of the run"));
         }
         Ok(())
     }
 
-    /// Waits for a frame; without one if the link is lost.
+    /// Waits for a frame; returns without one if the link is lost.
     fn wait(&mut self, timeout: Duration) {
         if self.lost.is_none()
             && let Err(error) = self.link.wait(timeout)
@@ -98,7 +99,7 @@ impl Remote {
     fn lose(&mut self, why: String) {
         if self.met && self.lost.is_none() {
             eprintln!(
-                "plant-sim: the controller on {} {why}; going on without it",
+                "plant-sim: the controller on {} {why}; continuing without it",
                 self.bus
             );
         }
@@ -106,7 +107,7 @@ impl Remote {
     }
 }
 
-/// Whether a frame says that its sender has just started.
+/// Whether a frame shows that its sender has just started.
 fn is_starting(frame: &CanFrame) -> bool {
     let mode = match codec::decode(frame).map(|received| received.message) {
         Ok(Message::State(state)) => state.mode,

@@ -1,4 +1,4 @@
-//! What a person names on the command line, read: scenarios, robots, payloads.
+//! Inputs named on the command line: scenarios, robots, payloads.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ pub enum InputError {
         scenario::names()
     )]
     NoScenario {
-        /// What was asked for.
+        /// The requested name.
         name: String,
     },
     /// The file cannot be read.
@@ -39,7 +39,7 @@ pub enum InputError {
     },
 }
 
-/// The scenario of this name, or in this file.
+/// The scenario of this name or in this file.
 ///
 /// # Errors
 /// See [`InputError`].

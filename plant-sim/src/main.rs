@@ -1,4 +1,4 @@
-//! `plant-sim`: runs the controller against the simulated robot, and looks at results.
+//! `plant-sim`: runs the controller against the simulated robot, and inspects the results.
 
 mod cli;
 

@@ -1,4 +1,4 @@
-//! A bus as it is now: what was seen of it in the last second, and what has gone wrong since the start.
+//! Live view of a bus: statistics of the last second, and errors since the start.
 
 mod pages;
 mod view;
@@ -22,7 +22,7 @@ const EVENTS: usize = 1000;
 /// The same event again within this time is one, us.
 const REPEATED_US: u64 = 100_000;
 
-/// Gathers what is shown.
+/// Gathers the data to show.
 pub struct Monitor {
     title: String,
     timing: BitTiming,
@@ -58,7 +58,7 @@ pub struct Picture {
 }
 
 impl Monitor {
-    /// Nothing seen yet on the bus of this name.
+    /// An empty monitor of the bus of this name.
     #[must_use]
     pub fn new(title: &str) -> Self {
         let timing = BitTiming::default();
@@ -77,7 +77,7 @@ impl Monitor {
         }
     }
 
-    /// Takes in what came over the bus.
+    /// Adds a record from the bus.
     pub fn record(&mut self, record: &Record) {
         self.tick(record.time_us);
         self.total.record(record);
@@ -116,7 +116,7 @@ impl Monitor {
         }
     }
 
-    /// Time goes on, also while the bus is silent.
+    /// Advances the time, also while the bus is silent.
     pub fn tick(&mut self, now_us: u64) {
         self.newest_us = self.newest_us.max(now_us);
         self.started_us.get_or_insert(now_us);

@@ -1,4 +1,4 @@
-//! Files that appear under their names when they are complete, all of a run together, or not at all.
+//! Files that appear under their names once complete, all of a run together, or not at all.
 
 use std::fs::{self, Permissions};
 use std::io::{self, BufWriter, Write};
@@ -11,7 +11,7 @@ use tempfile::NamedTempFile;
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write to {}: {source}", path.display())]
 pub struct OutputError {
-    /// Where.
+    /// Path.
     pub path: PathBuf,
     /// Reason.
     #[source]
@@ -25,7 +25,7 @@ impl OutputError {
     }
 }
 
-/// A file under construction beside its place. Dropped, it leaves no trace.
+/// A file under construction beside its destination. Dropped, it leaves no trace.
 #[derive(Debug)]
 pub struct File {
     file: BufWriter<NamedTempFile>,
@@ -33,10 +33,10 @@ pub struct File {
 }
 
 impl File {
-    /// An empty one that is to stand at `path`.
+    /// An empty file destined for `path`.
     ///
     /// # Errors
-    /// Its folder does not take files.
+    /// Its folder does not accept files.
     pub fn create(path: &Path) -> Result<Self, OutputError> {
         let folder = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -44,7 +44,7 @@ impl File {
         };
         let file = tempfile::Builder::new()
             .prefix(".partial-")
-            // What `std::fs::File::create` asks for; the process's mask takes away from it.
+            // As with `std::fs::File::create`; the umask of the process applies.
             .permissions(Permissions::from_mode(0o666))
             .tempfile_in(folder)
             .map_err(OutputError::at(path))?;
@@ -54,10 +54,10 @@ impl File {
         })
     }
 
-    /// Puts the file in its place.
+    /// Moves the file to its destination.
     ///
     /// # Errors
-    /// The rest could not be written, or what is at its place cannot be replaced.
+    /// The rest could not be written, or a file at the destination cannot be replaced.
     pub fn persist(self) -> Result<(), OutputError> {
         let Self { file, path } = self;
         file.into_inner()
@@ -94,10 +94,10 @@ pub fn write(path: &Path, text: &str) -> Result<(), OutputError> {
 pub struct Folder(PathBuf);
 
 impl Folder {
-    /// Makes the folder where there is none.
+    /// Creates the folder if missing.
     ///
     /// # Errors
-    /// It cannot be made.
+    /// It cannot be created.
     pub fn open(path: &Path) -> Result<Self, OutputError> {
         fs::create_dir_all(path).map_err(OutputError::at(path))?;
         Ok(Self(path.into()))
@@ -119,7 +119,7 @@ impl Folder {
         write(&self.0.join(name), text)
     }
 
-    /// That something in here could not be written.
+    /// The error that something in this folder could not be written.
     pub fn failed(&self, source: io::Error) -> OutputError {
         OutputError {
             path: self.0.clone(),

@@ -1,6 +1,6 @@
-//! Parameters over a bus: reads and writes them as an operator does, beside whatever else goes on there.
+//! Parameters over a bus: reads and writes them as an operator, alongside other traffic.
 //!
-//! One request is under way at a time. The controller answers for the drives as well; what they say has passed through it.
+//! One request is in progress at a time. The controller also answers for the drives, whose replies it forwards.
 
 mod show;
 
@@ -16,8 +16,8 @@ pub use show::{json, markdown, table};
 
 /// Wait for an answer before the request is repeated: some hundred samples.
 const PATIENCE: Duration = Duration::from_millis(250);
-/// A repeated request goes on by this many in the counter. Another operator may have left the counter anywhere; frames that
-/// look up to 127 behind are dropped, and of four counters a quarter of the circle apart at most two are.
+/// Increment of the counter for a repeated request. Another operator may have left the counter anywhere; frames that
+/// look up to 127 behind are dropped, which are at most two of four counters a quarter of the range apart.
 const STRIDE: u8 = 64;
 const ATTEMPTS: u32 = 4;
 
@@ -56,7 +56,7 @@ pub enum ClientError {
     },
     /// The controller answers, the drives do not.
     #[error(
-        "the drives on {bus} do not answer; they are there while a run is: plant-sim run --controller external --bus BUS"
+        "the drives on {bus} do not answer; they exist only during a run: plant-sim run --controller external --bus BUS"
     )]
     DrivesSilent {
         /// Bus.
@@ -85,7 +85,7 @@ pub enum ClientError {
         server: Server,
     },
     /// The value is out of range.
-    #[error("{name} is to be {value}; allowed: {allowed}")]
+    #[error("{name} cannot be {value}; allowed: {allowed}")]
     OutOfRange {
         /// Parameter.
         name: &'static str,
@@ -129,7 +129,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// Takes part in the bus, and asks whether a controller is there.
+    /// Joins the bus and checks for a controller.
     ///
     /// # Errors
     /// See [`ClientError`].
@@ -137,7 +137,7 @@ impl Client {
         let mut client = Self {
             link: Link::open(address)?,
             bus: address.to_string(),
-            // An operator that has just introduced itself has used number 0.
+            // An operator that has just sent its Hello has used counter 0.
             counter: 1,
             period: 0.0,
         };
@@ -184,7 +184,7 @@ impl Client {
                         bus: self.bus.clone(),
                     });
                 }
-                // Nothing from here on, or nothing of this server.
+                // No parameter from here on, or none of this server.
                 _ => return Ok(readings),
             }
         }
@@ -216,12 +216,12 @@ impl Client {
         }
     }
 
-    /// Writes a parameter, and returns what is in force then: from the next sample on.
+    /// Writes a parameter and returns the new value, which takes effect from the next sample.
     ///
     /// # Errors
     /// See [`ClientError`]; nothing has changed then.
     pub fn set(&mut self, parameter: &Parameter, value: f32) -> Result<Reading, ClientError> {
-        // What is allowed depends on the node. A node that hears a first request also takes no set.
+        // The range depends on the node. A node also ignores a set as the first request it receives.
         let present = self.get(parameter)?;
         let index = parameter.rule.number;
         let name = parameter.name;
@@ -281,7 +281,7 @@ impl Client {
             }
         }
         let bus = self.bus.clone();
-        // A controller that answers for itself was met before.
+        // The controller itself has answered before.
         Err(if is_for_drives(request) {
             ClientError::DrivesSilent { bus }
         } else {
@@ -295,7 +295,7 @@ impl Client {
             .expect("numbers were checked to be finite when they were read");
         let end = Instant::now() + PATIENCE;
         while let Err(source) = self.link.transmit(&frame) {
-            // A link that has failed says why.
+            // A failed link returns its error here.
             self.link.wait(Duration::from_millis(1))?;
             if source == TransmitError::Offline || left_until(end).is_none() {
                 return Err(ClientError::Transmit {
@@ -323,7 +323,7 @@ fn is_for_drives(request: &ParameterRequest) -> bool {
     }
 }
 
-/// Whether a reply belongs to this request and not to one that was given up.
+/// Whether a reply belongs to this request and not to an abandoned one.
 fn answers(request: &ParameterRequest, reply: &ParameterReply) -> bool {
     let (asked, listing) = match *request {
         ParameterRequest::Get { index } | ParameterRequest::Set { index, .. } => (index, false),
@@ -352,7 +352,7 @@ fn reading(number: u16, value: f32, lower: f32, upper: f32) -> Reading {
 pub struct Assignment {
     /// Row of the table.
     pub parameter: &'static Parameter,
-    /// Finite.
+    /// New value, finite.
     pub value: f32,
 }
 
@@ -379,7 +379,7 @@ impl std::str::FromStr for Assignment {
                     "" => String::new(),
                     unit => format!(" in {unit}"),
                 };
-                format!("{value:?} is no value of {name}; allowed: a number{unit}")
+                format!("{value:?} is not a value of {name}; allowed: a number{unit}")
             })?;
         Ok(Self { parameter, value })
     }

@@ -1,6 +1,6 @@
 //! Plays a trace onto a bus, at the times of its records or at a multiple of their speed.
 //!
-//! Deadlines are absolute, so what comes late does not delay what follows. All interfaces of a trace go onto the one bus.
+//! Deadlines are absolute, so a late frame does not delay the next. All interfaces of a trace go onto the same bus.
 
 use std::time::{Duration, Instant};
 
@@ -10,13 +10,13 @@ use protocol::frame::CanFrame;
 
 use trace::{Entry, Record};
 
-/// Between two attempts when the transmit queue is full: a few frames of a fast bus.
+/// Interval of attempts while the transmit queue is full: a few frames of a fast bus.
 const RETRY: Duration = Duration::from_micros(500);
-/// Time without a place in the transmit queue after which nobody is believed to take frames any more.
+/// Time with a full transmit queue after which nobody seems to take frames any more.
 const STUCK: Duration = Duration::from_secs(2);
-/// Stay on the bus after the last frame: a serial-line adapter says only then that it refused it.
+/// Time to stay on the bus after the last frame, for a late refusal by a serial-line adapter.
 const LINGER: Duration = Duration::from_millis(100);
-/// Frames of others that are thrown away at once: a flooded bus must not keep the player from its own frames.
+/// Most received frames to discard at once: a flooded bus must not keep the player from its own frames.
 const BATCH: usize = 1024;
 
 /// Why playing ended early.
@@ -44,12 +44,12 @@ pub struct Pace {
     longest: Duration,
     /// Latest time of a record so far, us.
     newest_us: Option<u64>,
-    /// Played time up to then, before it is divided by the speed.
+    /// Played time up to then, before division by the speed.
     recorded: Duration,
 }
 
 impl Pace {
-    /// `speed` times as fast as recorded; 0 leaves out every pause. Steps of time longer than `skip` take none.
+    /// `speed` times as fast as recorded; 0 without pauses. Steps of time longer than `skip` are skipped.
     #[must_use]
     pub fn new(speed: f64, skip: Option<Duration>) -> Self {
         Self {
@@ -60,7 +60,7 @@ impl Pace {
         }
     }
 
-    /// Time after the first frame at which the one of this record is due: never before an earlier one, even where the
+    /// Time after the first frame at which the one of this record is due: never before an earlier one, even if the
     /// clock of the trace was set back.
     pub fn due(&mut self, time_us: u64) -> Duration {
         let newest_us = *self.newest_us.get_or_insert(time_us);
@@ -78,20 +78,20 @@ impl Pace {
     }
 }
 
-/// What was played.
+/// Counts of a played trace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Played {
-    /// Frames that the bus took.
+    /// Frames that the bus accepted.
     pub frames: u64,
-    /// Frames that had to wait for a place in the transmit queue.
+    /// Frames that had to wait for room in the transmit queue.
     pub waited: u64,
-    /// Error frames: reports of a receiver, which nobody can send.
+    /// Error frames: reports of a receiver, which cannot be sent.
     pub left_out: u64,
     /// Frames that a serial-line adapter refused, or that a client lost because it did not read.
     pub lost: u64,
 }
 
-/// Plays records, one after the other.
+/// Plays records one by one.
 #[derive(Debug)]
 pub struct Player {
     link: Link,
@@ -101,7 +101,7 @@ pub struct Player {
 }
 
 impl Player {
-    /// Plays onto `link` at this pace.
+    /// A player onto `link` at this pace.
     #[must_use]
     pub fn new(link: Link, pace: Pace) -> Self {
         Self {
@@ -112,7 +112,7 @@ impl Player {
         }
     }
 
-    /// Waits until somebody takes part in a bus that this process offers. Other buses are there already.
+    /// Waits until a client joins a bus that this process serves. Other buses exist already.
     ///
     /// # Errors
     /// The link failed.
@@ -123,11 +123,11 @@ impl Player {
         Ok(())
     }
 
-    /// How long the record of this time has to wait from now on.
+    /// Time that the record of this time still has to wait.
     #[must_use]
     pub fn wait(&self, time_us: u64) -> Duration {
         let now = self.start.map_or(Duration::ZERO, |start| start.elapsed());
-        // A copy: only playing the record moves the pace on.
+        // A copy: only playing the record advances the pace.
         let mut pace = self.pace;
         pace.due(time_us).saturating_sub(now)
     }
@@ -135,7 +135,7 @@ impl Player {
     /// Sends the frame of the next record when it is due.
     ///
     /// # Errors
-    /// The bus does not take it; see [`PlayError`].
+    /// The bus does not accept it; see [`PlayError`].
     pub fn record(&mut self, record: &Record) -> Result<(), PlayError> {
         let due = self.pace.due(record.time_us);
         let Entry::Frame(frame) = &record.entry else {
@@ -149,10 +149,10 @@ impl Player {
         Ok(())
     }
 
-    /// Sees the last frames out.
+    /// Waits until the last frames are sent.
     ///
     /// # Errors
-    /// The bus does not take them; see [`PlayError`].
+    /// The bus does not accept them; see [`PlayError`].
     pub fn finish(mut self) -> Result<Played, PlayError> {
         let mut left = (self.link.unsent(), Instant::now());
         while left.0 > 0 {
@@ -185,7 +185,7 @@ impl Player {
                     self.idle(RETRY)?;
                 }
                 Err(TransmitError::Offline) => {
-                    // The link knows the reason, if there is one, and tells it when waited for.
+                    // Waiting on the link returns the reason, if there is one.
                     self.link.wait(Duration::ZERO)?;
                     return Err(PlayError::Offline);
                 }
@@ -195,7 +195,7 @@ impl Player {
         Ok(())
     }
 
-    /// Lets time pass, and with it the frames of others: discards received frames so that the socket does not fill.
+    /// Lets time pass, and discards received frames so that the socket does not fill.
     fn idle(&mut self, time: Duration) -> Result<(), PlayError> {
         let begun = Instant::now();
         loop {

@@ -15,7 +15,7 @@ use protocol::messages::{Cause, Command, Feedback, Message, Mode, Node, State};
 use series::Series;
 use trace::{Entry, Record};
 
-/// Mode changes and faults that are drawn; more than fit on a page are counted only.
+/// Most mode changes and faults that are drawn; further ones are only counted.
 const MAX_EVENTS: usize = 200;
 
 /// The pictures one below the other, as a self-contained SVG document.
@@ -24,7 +24,7 @@ pub fn page(plots: &[Plot]) -> String {
     svg::page(plots)
 }
 
-/// Gathers what is drawn, record by record.
+/// Gathers the data of a plot, record by record.
 pub struct Plot {
     drive: Drive,
     torque_limit: [f32; 4],
@@ -38,7 +38,7 @@ pub struct Plot {
     actual: [Series; 4],
     /// Reference minus measurement.
     error: [Series; 4],
-    /// Motor torques asked for, of their limits.
+    /// Commanded motor torques, relative to their limits.
     torque: [Series; 4],
     modes: Vec<(u64, Mode)>,
     marks: Vec<Mark>,
@@ -46,7 +46,7 @@ pub struct Plot {
     undrawn: u64,
 }
 
-/// Something that happened.
+/// An event to mark.
 struct Mark {
     time_us: u64,
     text: String,
@@ -54,7 +54,7 @@ struct Mark {
 }
 
 impl Plot {
-    /// Nothing to draw yet, for a robot that turns counts into joints as `arm` does.
+    /// An empty plot, for a robot with the joints and encoders of `arm`.
     #[must_use]
     pub fn new(arm: &ArmModel, title: &str) -> Self {
         Self {
@@ -75,10 +75,10 @@ impl Plot {
         }
     }
 
-    /// Takes the next record in. Frames that the protocol refuses are left out.
+    /// Adds the next record. Frames that the protocol refuses are left out.
     pub fn record(&mut self, record: &Record) {
         let first = *self.first_us.get_or_insert(record.time_us);
-        // A clock that is set back stands still instead.
+        // A clock set back stands still instead.
         self.newest_us = self.newest_us.max(record.time_us.saturating_sub(first));
         let Entry::Frame(frame) = &record.entry else {
             return;
@@ -129,7 +129,7 @@ impl Plot {
         }
     }
 
-    /// The report carries the error of the newest sample; with the position of that sample it gives the reference.
+    /// Adds a report: its error of the newest sample plus the position of that sample gives the reference.
     fn state(&mut self, state: &State) {
         self.mode(state.mode);
         if state.cause != self.cause && state.cause != Cause::None {
@@ -175,5 +175,5 @@ impl Plot {
     }
 }
 
-/// The same event again within this time is one.
+/// Repetitions of an event within this time count as one, us.
 const REPEATED_US: u64 = 10_000;

@@ -1,11 +1,11 @@
-//! The observer that says how far a run is.
+//! The observer that reports the progress of a run.
 
 use std::time::Instant;
 
 use sim::observer::Observer;
 use sim::world::CellEvent;
 
-/// Says on standard error how far a long run is.
+/// Reports the progress of a long run on standard error.
 pub struct Progress {
     total: u32,
     done: u32,
@@ -13,7 +13,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// At the start of so many cycles.
+    /// At the start of a run of this many cycles.
     pub fn new(total: u32) -> Self {
         Self {
             total,

@@ -1,4 +1,4 @@
-//! The controller as an image on an emulated Cortex-M4F, in lock-step, and held against its twin to the byte.
+//! The controller as an image on an emulated Cortex-M4F, in lock-step, compared with its twin byte for byte.
 
 mod board;
 mod image;
@@ -29,19 +29,19 @@ use sim::world::Mind;
 use sim::world::World;
 use trace::difference::Difference;
 
-/// What the emulation is asked for.
+/// Options of the emulation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The image; `None` builds [`IMAGE`] from the sources.
     pub image: Option<PathBuf>,
     /// How frames travel between the rig and the board.
     pub channel: Channel,
-    /// Count instructions: the emulated clock then moves by instructions and by nothing else. Slower, and
+    /// Count instructions: the emulated clock then advances by instructions alone. Slower, and
     /// over the FIFOs only.
     pub count: Option<Rc<RefCell<Costs>>>,
 }
 
-/// What a run has cost the board.
+/// Cost of a run on the board.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Costs {
     /// Every call of the node.
@@ -50,22 +50,22 @@ pub struct Costs {
     pub stack: u32,
 }
 
-/// What one call of the node has cost.
+/// Cost of one call of the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Poll {
     /// Instructions from frame in to frames out.
     pub instructions: u32,
-    /// Instructions of each phase, zeros from an image that does not tell them apart.
+    /// Instructions of each phase; zeros from an image that does not measure phases.
     pub phases: [u32; Phase::ALL.len()],
-    /// Identifier of the frame that came, if any.
+    /// Identifier of the frame received, if any.
     pub received: Option<u32>,
     /// Whether a move was being planned.
     pub planning: bool,
 }
 
-/// The image that goes into runs, and the one that can plant faults into itself.
+/// The image for runs.
 pub const IMAGE: &str = "mps2-an386";
-/// See [`IMAGE`].
+/// The image that can plant faults into itself.
 pub const FAULTS_IMAGE: &str = "mps2-an386-faults";
 /// The image that measures the phases of a call.
 pub const COST_IMAGE: &str = "mps2-an386-cost";
@@ -78,18 +78,18 @@ pub struct Qemu {
     board: Board,
     /// How frames travel; `None` once the bus is closed.
     channel: Option<Channel>,
-    /// What the board has sent, empty between calls.
+    /// Frames sent by the board; empty between calls.
     sent: Vec<CanFrame>,
-    /// How the board ended when it last started again.
+    /// How the board ended before its last restart.
     last_stop: Option<Stop>,
     count: Option<Rc<RefCell<Costs>>>,
 }
 
 impl Qemu {
-    /// Starts the emulator with the image and tells the board its configuration.
+    /// Starts the emulator with the image and sends the board its configuration.
     ///
     /// # Errors
-    /// The image cannot be built, the emulator is missing or does not answer; each with what to do about it.
+    /// The image cannot be built, the emulator is missing or does not answer; the error says what to do.
     pub fn start(config: Config, options: &Options) -> Result<Self, PeerError> {
         let image = match &options.image {
             Some(image) => image.clone(),
@@ -109,17 +109,17 @@ impl Qemu {
             last_stop: None,
             count: options.count.clone(),
         };
-        // So every run begins, wherever the controller is.
+        // Every run begins like this, wherever the controller is.
         qemu.reset(peers::reset())?;
         qemu.last_stop = None;
         Ok(qemu)
     }
 
-    /// Has the image plant this fault into itself; only [`FAULTS_IMAGE`] does. Follows the board through its start, and
-    /// starts the twin for the same reason.
+    /// Lets the image plant this fault into itself, which only [`FAULTS_IMAGE`] does. Follows the board through its
+    /// restart and restarts the twin with the same reason.
     ///
     /// # Errors
-    /// The board does not start again.
+    /// The board does not restart.
     pub fn plant(&mut self, fault: Fault) -> Result<(), PeerError> {
         self.board.send_request(&Request::Plant(fault))?;
         let reason = self.follow_restart()?;
@@ -127,19 +127,19 @@ impl Qemu {
         Ok(())
     }
 
-    /// Follows the board through its start; returns the reason.
+    /// Follows the board through its restart; returns the reason.
     fn follow_restart(&mut self) -> Result<ResetReason, PeerError> {
         let stop = self.board.restart(&mut self.sent)?;
         self.last_stop = Some(stop);
         Ok(stop.reason)
     }
 
-    /// How the board ended when it last started again in this run.
+    /// How the board ended before its last restart in this run.
     pub fn last_stop(&self) -> Option<Stop> {
         self.last_stop
     }
 
-    /// Ends the emulation; returns what the board has logged, one message a line.
+    /// Ends the emulation; returns the board's log, one message per line.
     ///
     /// # Errors
     /// The log cannot be read.
@@ -150,7 +150,7 @@ impl Qemu {
         log::decode(&image, &bytes)
     }
 
-    /// Calls the node on the board once, and has it counted.
+    /// Calls the node on the board once and records the cost.
     fn ask(&mut self, frame: Option<&CanFrame>, planning: bool) -> Result<(), PeerError> {
         let request = Request::Poll {
             now: self.twin.controller().now(),
@@ -168,7 +168,7 @@ impl Qemu {
         Ok(())
     }
 
-    /// Hands over the frame that resets the board, and follows it through its start.
+    /// Sends the frame that resets the board, and follows it through its restart.
     fn reset(&mut self, frame: CanFrame) -> Result<(), PeerError> {
         self.sent.clear();
         match self.channel {
@@ -181,7 +181,7 @@ impl Qemu {
         self.follow_restart().map(drop)
     }
 
-    /// Has board and twin do the same; what the board sends is in `sent`.
+    /// Calls board and twin alike; the board's frames are in `sent`.
     fn call(&mut self, now: Instant, received: Option<&CanFrame>) -> Result<(), PeerError> {
         let before = self.twin.controller().now();
         let planning = |twin: &Twin| twin.node().controller().is_planning();
@@ -191,11 +191,11 @@ impl Qemu {
             return self.reset(*frame);
         }
         match (self.channel, received) {
-            // On the UART the board starts when the bus is opened, and its time is that of the frames.
+            // On the UART the board starts when the bus is opened, and its time follows the frames.
             (Some(Channel::Uart), None) => {}
             (Some(Channel::Uart), Some(frame)) => self.board.exchange(frame, &mut self.sent)?,
             (_, received) => {
-                // As the twin does when a frame has moved time on.
+                // Like the twin when a frame has advanced the time.
                 if received.is_some() && self.twin.controller().now() > before {
                     self.ask(None, false)?;
                 }
@@ -205,7 +205,7 @@ impl Qemu {
         Ok(())
     }
 
-    /// Holds what the board has sent against the twin.
+    /// Compares the board's frames with the twin's.
     fn compare(&mut self, now: Instant) -> Result<(), PeerError> {
         let differs = |difference: Difference| {
             failure(format!(
@@ -220,7 +220,7 @@ impl Qemu {
         Difference::between(missing, None).map_or(Ok(()), |missing| Err(differs(missing)))
     }
 
-    /// What the board can tell only at the very end: bytes lost, and the stack when the deepest path has been taken.
+    /// What the board reports at the end: bytes lost, and the most stack used.
     fn say_goodbye(&mut self) {
         if self.channel.take() == Some(Channel::Uart)
             && let Ok(lost @ 1..) = self.board.close_bus()
@@ -249,7 +249,7 @@ impl Peer for Qemu {
         out: &mut Outbox,
     ) -> Result<(), PeerError> {
         self.call(now, received)?;
-        // A board that has been reset over the UART has said its first words, the twin has yet to be called for them.
+        // A board reset over the UART has already sent its first frames; the twin has yet to be called for them.
         if !self.twin.controller().is_new() {
             self.compare(now)?;
             out.extend(self.sent.drain(..).map(|frame| (now + COMPUTE, frame)));

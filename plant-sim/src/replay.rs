@@ -1,7 +1,8 @@
-//! Feeds a trace into a fresh controller and compares what it commands, byte for byte.
+//! Feeds a trace into a fresh controller and compares its commands byte for byte.
 //!
-//! The controller is a function of the frames it receives, so the same trace gives the same commands: on this machine, on
-//! another, on a board. Where they part, either the program differs or the trace is not all that the controller received.
+//! The controller is a function of the frames it receives, so the same trace gives the same commands: on this machine,
+//! on another, on a board. If they differ, either the program differs or the trace lacks frames that the controller
+//! received.
 
 use firmware::control::controller::Config;
 use protocol::messages::Node;
@@ -12,9 +13,9 @@ use trace::{Entry, Record};
 
 use crate::twin::Twin;
 
-/// Commands that may wait for their place in the trace: more than any queue between controller and bus holds.
+/// Commands that may wait to appear in the trace: more than any queue between controller and bus holds.
 const WAITING: usize = 64;
-/// Silence after which the controller has reacted to all there is to react to; more of it is skipped.
+/// Silence after which the controller has nothing left to react to; further silence is skipped.
 const SETTLED: Duration = Duration::from_secs(1);
 
 /// A controller under replay: the twin of the recorded one.
@@ -36,10 +37,10 @@ impl Replay {
         }
     }
 
-    /// Feeds or compares the next record. After a difference, what follows means nothing.
+    /// Feeds or compares the next record. After a difference, further results are meaningless.
     ///
     /// # Errors
-    /// The first [`Difference`]: `due` is what the replay gave, `found` is in the trace.
+    /// The first [`Difference`]: `due` is from the replay, `found` from the trace.
     pub fn record(&mut self, record: &Record) -> Result<(), Difference> {
         let Entry::Frame(frame) = &record.entry else {
             return Ok(());
@@ -49,7 +50,7 @@ impl Replay {
             self.compared += 1;
             return self.twin.compare(frame);
         }
-        // What the controller itself sent, it did not receive.
+        // The controller did not receive its own frames.
         if info.is_some_and(|info| info.sender == Some(Node::Controller)) {
             return Ok(());
         }
@@ -71,9 +72,9 @@ impl Replay {
         self.compared
     }
 
-    /// Between two frames the controller looks at the time, as it did when they were recorded.
+    /// Lets time pass between two frames, with calls of the controller as when they were recorded.
     fn pass_time(&mut self, now: Instant) {
-        // The node's time never runs backwards, whatever the trace's does.
+        // The node's time never runs backwards, even if the trace's does.
         let now = self.now.max(now);
         let skipped = Instant::from_nanos(now.nanos().saturating_sub(SETTLED.nanos()));
         if self.twin.controller().is_new() {

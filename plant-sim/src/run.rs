@@ -16,7 +16,7 @@ use sim::summary::Summary;
 use crate::output::{Folder, OutputError};
 use crate::progress::Progress;
 
-/// Why there are no results.
+/// Why a run has no results.
 #[derive(Debug, thiserror::Error)]
 pub enum ExecuteError {
     /// The run cannot begin.
@@ -30,7 +30,7 @@ pub enum ExecuteError {
     Output(#[from] OutputError),
 }
 
-/// What a run came to, as `summary.json` holds it.
+/// Results of a run, as in `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Results {
     /// Version of the program.
@@ -39,7 +39,7 @@ pub struct Results {
     pub commit: &'static str,
     /// Command line.
     pub command: Vec<String>,
-    /// What was run, and what is judged.
+    /// What was run, and its metrics.
     #[serde(flatten)]
     pub summary: Summary,
     /// Time the run took on this machine, s.
@@ -57,8 +57,8 @@ impl Results {
     }
 }
 
-/// Runs a scenario and writes `trace.log`, `truth.csv` and `summary.json` into `out`; each appears under its name when it
-/// is complete.
+/// Runs a scenario and writes `trace.log`, `truth.csv` and `summary.json` into `out`; each appears under its name
+/// once it is complete.
 ///
 /// A scenario that could not be completed still has a summary, with `completed` false and the reason in `error`.
 ///
@@ -74,11 +74,11 @@ pub fn execute(config: &RunConfig, out: &Path) -> Result<Results, ExecuteError> 
     )
 }
 
-/// Runs a scenario as [`execute`] does, with the controller that `connect` starts, as fast as `pace` lets it, and in
-/// sight of one more observer.
+/// Runs a scenario like [`execute`], with the controller that `connect` starts, at the pace of `pace`, and with one
+/// more observer.
 ///
 /// # Errors
-/// As [`execute`], and [`ExecuteError::Controller`] when `connect` fails.
+/// Like [`execute`], and [`ExecuteError::Controller`] if `connect` fails.
 pub fn execute_with<C: Peer, P: Pace, O: Observer>(
     config: &RunConfig,
     out: &Path,

@@ -1,4 +1,4 @@
-//! A controller in this process that is given the same frames as another, which must then send the same.
+//! A controller in this process that receives the same frames as another one, which must then send the same.
 
 use std::collections::VecDeque;
 
@@ -10,13 +10,13 @@ use protocol::time::Instant;
 use sim::controller::InProcess;
 use trace::difference::Difference;
 
-/// The controller that others are held against.
+/// The controller that others are compared with.
 #[derive(Debug)]
 pub struct Twin {
     controller: InProcess,
-    /// What it has sent and the other has not yet.
+    /// Frames that it has sent and the other has not yet.
     due: VecDeque<CanFrame>,
-    /// What a call has sent, empty in between.
+    /// Frames sent in the current call; empty between calls.
     sent: Vec<CanFrame>,
 }
 
@@ -40,19 +40,19 @@ impl Twin {
         self.controller.node()
     }
 
-    /// Starts again, as the other did, for this reason.
+    /// Restarts like the other, for this reason.
     pub fn restart(&mut self, reason: ResetReason) {
         self.controller.restart(reason);
         self.due.clear();
     }
 
-    /// Does as the other does when it is called so.
+    /// Calls the twin like the other controller.
     pub fn call(&mut self, now: Instant, received: Option<&CanFrame>) {
         self.controller.call(now, received, &mut self.sent);
         self.due.extend(self.sent.drain(..));
     }
 
-    /// Holds what the other has sent against what is due next.
+    /// Compares a frame of the other with the next one expected.
     ///
     /// # Errors
     /// They differ.
@@ -61,7 +61,7 @@ impl Twin {
         Difference::between(due.as_ref(), Some(found)).map_or(Ok(()), Err)
     }
 
-    /// What the other has still to send.
+    /// Frames that the other has yet to send.
     pub fn due(&mut self) -> &mut VecDeque<CanFrame> {
         &mut self.due
     }

@@ -12,23 +12,23 @@ use protocol::frame::CanFrame;
 use protocol::time::Instant;
 use sim::observer::{Observer, Pace};
 
-/// Between two looks for a client.
+/// Interval of checking for a client.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Viewers of the bus of a run. As an observer they see its frames; as a pace they hold the run until the first of
-/// them is there, and then to the speed of the clock, so that a person can follow it.
+/// them has connected, and then to real time, so that a person can follow it.
 #[derive(Clone)]
 pub struct Viewers {
     hub: Rc<RefCell<Link>>,
-    /// When the run began on the machine's clock.
+    /// Start of the run on the machine's clock.
     origin: Option<Duration>,
 }
 
 impl Viewers {
-    /// Nobody yet, on `server`, `HOST:PORT`.
+    /// No viewers yet; listens on `server`, `HOST:PORT`.
     ///
     /// # Errors
-    /// The port is taken or not this machine's.
+    /// The port is in use, or the address is not one of this machine.
     pub fn bind(server: &str) -> Result<Self, LinkError> {
         let hub = SlcanHub::bind(server, Clients::Watch)?;
         Ok(Self {
@@ -48,10 +48,10 @@ impl Viewers {
 
 impl Observer for Viewers {
     fn frame(&mut self, _: Instant, frame: &CanFrame) -> io::Result<()> {
-        // A hub takes every frame; clients that do not read lose it, and the run does not wait for them.
+        // A hub accepts every frame; clients that do not read lose it, and the run does not wait for them.
         let mut hub = self.hub.borrow_mut();
         let _ = hub.transmit(frame);
-        // Clients that come later are let in, and frames of any are refused: there is nothing to take.
+        // Later clients are accepted, and frames from clients are refused: there is nothing to take.
         hub.wait(Duration::ZERO).map_err(io::Error::other)?;
         Ok(())
     }
@@ -60,7 +60,7 @@ impl Observer for Viewers {
 impl Pace for Viewers {
     fn sample(&mut self, now: Instant) -> io::Result<()> {
         let now = Duration::from_nanos(now.nanos());
-        // Answers clients, accepts new ones and lets others go.
+        // Answers clients, accepts new ones and drops closed ones.
         if let Link::SlcanHub(hub) = &mut *self.hub.borrow_mut() {
             hub.exchange();
         }

@@ -1,4 +1,4 @@
-//! What `eval` accepts, what it prints, and what it says when it refuses.
+//! What `eval` accepts and prints, and its refusals.
 
 use plant_sim::eval::{By, Table, eval};
 use sim::model::RobotModel;
@@ -161,8 +161,8 @@ fn the_controller_may_refuse_a_model_that_the_plant_takes() {
 
 #[test]
 fn the_easier_solution_decides_the_reason() {
-    // Straight behind the robot the shoulder reaches with one elbow and not with the other; above and behind, the one
-    // fails for its shoulder, and both fail for their height.
+    // Straight behind the robot the shoulder is within limits for one elbow and not for the other; above and behind,
+    // one fails for its shoulder, and both fail for their height.
     let row = |x: f64, y: f64, z: f64| {
         let output = run(Table::Ik, By::Plant, &format!("x,y,z,yaw\n{x},{y},{z},0\n")).unwrap();
         let cells: Vec<_> = output

@@ -40,7 +40,7 @@ impl Observer for Seen {
     }
 }
 
-/// A controller with a link for its bus, configured with nothing but robot and rate.
+/// A controller with a link as its bus, configured with robot and rate only.
 fn controller(mut link: Link, period: Period, stop: &AtomicBool) {
     let start = || {
         (
@@ -65,7 +65,7 @@ fn controller(mut link: Link, period: Period, stop: &AtomicBool) {
     }
 }
 
-/// A controller on a link of its own: what ends it, and where it is found.
+/// A controller on its own link: its stop flag and its address.
 fn serve(rate: f64) -> (Arc<AtomicBool>, LinkAddress, JoinHandle<()>) {
     let port = TcpListener::bind("127.0.0.1:0")
         .unwrap()
@@ -124,7 +124,7 @@ fn an_external_controller_moves_the_arm_by_the_same_bits() {
     }
 }
 
-/// The link fails in the middle of the run: to the operator the controller is silent, and the arm has come to rest.
+/// The link fails in the middle of the run: to the operator the controller is silent, and the arm comes to rest.
 #[test]
 fn a_controller_that_goes_away_is_a_result() {
     let config = RunConfig::new(Scenario::built_in("gate").unwrap());

@@ -1,4 +1,4 @@
-//! The monitor's picture of a bus whose traffic is known.
+//! The monitor's picture of a bus with known traffic.
 
 use plant_sim::monitor::{Monitor, View};
 use protocol::codec;
@@ -87,7 +87,7 @@ fn line(screen: &[String], part: &str) -> String {
         .clone()
 }
 
-/// 1 kHz for 1.5 s with sample 1200 lost: the full second before is shown, the loss since the start.
+/// 1 kHz for 1.5 s with sample 1200 lost: the last full second is shown, and the loss since the start.
 #[test]
 fn rates_are_those_of_the_last_second_and_losses_of_all() {
     let mut monitor = Monitor::new("socketcan:can7");
@@ -109,7 +109,7 @@ fn rates_are_those_of_the_last_second_and_losses_of_all() {
     assert!(line(&values, "sample=1499").contains("status=ready"));
 }
 
-/// Two seconds without a frame: nothing is shown as if it still came.
+/// Two seconds without a frame: nothing is shown as still arriving.
 #[test]
 fn silence_is_shown() {
     let mut monitor = Monitor::new("bus");

@@ -1,4 +1,4 @@
-//! The listing for people is that of the table; the bus is tried in `tests/ci/14-parameters.sh`.
+//! The listing in the docs matches the table; the bus is tested in `tests/ci/14-parameters.sh`.
 
 use plant_sim::parameters::{Assignment, Reading, json, markdown, table};
 use protocol::parameters;
@@ -9,7 +9,7 @@ fn the_document_is_the_table() {
     let kept = std::fs::read_to_string(path).unwrap();
     assert!(
         kept == markdown(),
-        "docs/parameters.md is not what the table says; make it anew with: \
+        "docs/parameters.md differs from the table; regenerate it with: \
          cargo run -- parameters --markdown >docs/parameters.md"
     );
 }
@@ -26,11 +26,11 @@ fn an_assignment_says_what_is_allowed() {
     assert!(!names.contains("sampling-period"), "a reading: {names}");
     assert_eq!(
         refusal("brake-delay=60ms"),
-        "\"60ms\" is no value of brake-delay; allowed: a number in s"
+        "\"60ms\" is not a value of brake-delay; allowed: a number in s"
     );
     assert_eq!(
         refusal("damping=inf"),
-        "\"inf\" is no value of damping; allowed: a number"
+        "\"inf\" is not a value of damping; allowed: a number"
     );
     let assignment: Assignment = "hold-samples=7".parse().unwrap();
     assert_eq!(

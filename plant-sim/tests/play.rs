@@ -1,4 +1,4 @@
-//! Traces played onto a serial line whose other end is a socket of the test. SocketCAN: `tests/ci/10-vcan.sh`.
+//! Traces played onto a serial line with a socket of the test at its other end. SocketCAN: `tests/ci/10-vcan.sh`.
 
 use std::io::Read;
 use std::net::{TcpListener, TcpStream};
@@ -51,7 +51,7 @@ fn every_frame_is_played_in_order_and_none_before_its_time() {
     player.record(&record(1_000, classical)).unwrap();
     player.record(&error).unwrap();
     player.record(&record(201_000, long_frame())).unwrap();
-    // 200 ms at twice the speed. A bound from below holds on any machine.
+    // 200 ms at twice the speed. A lower bound holds on any machine.
     assert!(begun.elapsed() >= Duration::from_millis(100));
     let played = player.finish().unwrap();
     assert_eq!(
@@ -72,12 +72,12 @@ fn every_frame_is_played_in_order_and_none_before_its_time() {
 
 #[test]
 fn a_slow_reader_delays_and_loses_nothing() {
-    // More than the buffers of any socket hold: megabytes.
+    // More than the buffers of any socket can hold: megabytes.
     const FRAMES: u64 = 100_000;
     let (link, mut peer) = adapter();
     let mut player = Player::new(link, Pace::new(0.0, None));
     let heard = thread::spawn(move || {
-        // Full buffers are what is to be seen: the reader starts when they are.
+        // The reader starts only once the buffers are full.
         thread::sleep(Duration::from_millis(300));
         let mut text = Vec::new();
         peer.read_to_end(&mut text).unwrap();
@@ -122,7 +122,7 @@ proptest! {
         for &time in &times {
             let recorded = f64::from(time.saturating_sub(times[0])) * 1e-6;
             latest = latest.max(recorded / speed);
-            // A duration counts nanoseconds; the two ways to compute it round a few times each.
+            // A duration counts nanoseconds; the two computations round a few times each.
             let allowed = 1e-9 + latest * 4.0 * f64::EPSILON;
             prop_assert!((pace.due(u64::from(time)).as_secs_f64() - latest).abs() <= allowed);
         }

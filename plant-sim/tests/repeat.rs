@@ -1,4 +1,4 @@
-//! A run is repeated from nothing but its summary, to the byte.
+//! A run can be repeated from its summary alone, to the byte.
 
 use std::fs;
 use std::path::Path;
@@ -22,7 +22,7 @@ fn run(words: &[&str], out: &Path) -> (Value, Vec<u8>) {
     )
 }
 
-/// The file that a model of a summary was read from, written anew.
+/// Writes the file that a model of a summary was read from.
 fn model_file(model: &Value, path: &Path) -> String {
     let text = match model["text"].as_str() {
         Some(text) => text.to_owned(),
@@ -38,7 +38,7 @@ fn model_file(model: &Value, path: &Path) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// Runs, then runs again what the summary says, and compares.
+/// Runs, repeats the run from its summary, and compares.
 fn repeated(words: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let [first, second] = ["first", "second"].map(|name| folder.path().join(name));
@@ -62,7 +62,7 @@ fn repeated(words: &[&str]) -> Value {
         &second,
     );
     assert_eq!(summary["trace_sha256"], again["trace_sha256"], "{words:?}");
-    assert!(truth == same_truth, "{words:?}: other truth");
+    assert!(truth == same_truth, "{words:?}: different truth");
     for key in [
         "law",
         "rate_hz",
@@ -95,7 +95,7 @@ fn what_the_command_line_changed_is_repeated() {
     assert_eq!(summary["payload"]["mass"], 3.3);
     assert_eq!(summary["payload"]["com_flange_frame"][2], 0.05);
     assert_eq!(summary["mismatch"]["friction"], 1.2);
-    // A corner of 0.15 rad a sample at 500 Hz.
+    // A corner of 0.15 rad per sample at 500 Hz.
     assert_eq!(summary["gains"]["bandwidth"], 75.0);
     assert_eq!(summary["state"], "ready");
     assert_eq!(summary["fault"], Value::Null);

@@ -1,4 +1,4 @@
-//! `plant-sim trace` as a person types it: what it says, what it refuses, and how it ends.
+//! `plant-sim trace` on the command line: its messages, refusals and exit codes.
 
 use std::fs;
 use std::io::Write;
@@ -9,12 +9,12 @@ use std::sync::LazyLock;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-/// Frames of a neighbour, which the protocol does not know.
+/// Frames of a foreign node, unknown to the protocol.
 const FOREIGN: &str = "(1.000000) can0 123#00\n(1.100000) can0 123#01 T\n(1.300000) can0 124#\n";
 
 static FOLDER: LazyLock<tempfile::TempDir> = LazyLock::new(|| tempfile::tempdir().unwrap());
 
-/// One cycle, as `plant-sim run` leaves it.
+/// One cycle, as written by `plant-sim run`.
 static RUN: LazyLock<PathBuf> = LazyLock::new(|| {
     let out = FOLDER.path().join("run");
     let run = plant_sim(&[
@@ -87,7 +87,7 @@ fn a_log_without_anything_to_judge_has_an_exit_code_of_its_own() {
 #[test]
 fn two_interfaces_are_two_buses() {
     let one = fs::read_to_string(&*RUN).unwrap();
-    // As candump of `any` writes what crosses two of them: every frame twice.
+    // As written by candump of `any` for traffic across two interfaces: every frame twice.
     let both: String = one
         .lines()
         .map(|line| format!("{}\n{line}\n", line.replace(" can0 ", "  vcan10 ")))
@@ -117,7 +117,7 @@ fn two_interfaces_are_two_buses() {
         &["convert", "--to", "candump", "--interface", "can0"],
     );
     assert_eq!(chosen.1, one);
-    // An offence is that of its interface.
+    // A violation belongs to its interface.
     let commands: Vec<&str> = both
         .lines()
         .filter(|line| line.contains(" can0 240"))
@@ -145,7 +145,7 @@ fn what_is_selected_is_judged_and_the_rest_is_followed() {
     );
     let (code, compared, _) = of_file(&RUN, &["replay", "--from", "0.1", "--to", "0.2"]);
     assert_eq!((code, judged(&compared)), (0, judged(&some)));
-    // A damaged frame that is not selected is no offence.
+    // A damaged frame outside the selection is not a violation.
     let mut lines: Vec<&str> = log.lines().collect();
     let place = lines
         .iter()
@@ -244,7 +244,7 @@ fn periods_have_a_distribution() {
     let mut time = 1_000_000_u64;
     let log: String = (0..=1000_u64)
         .map(|n| {
-            // 900 to 1099 us, in a mixed order, and now and then 50 ms.
+            // 900 to 1099 us in mixed order, and occasionally 50 ms.
             time += if n % 100 == 99 {
                 50_000
             } else {
@@ -283,7 +283,7 @@ fn compressed_logs_and_our_own_formats_are_read() {
     let packed = packed.finish().unwrap();
     let (_, expected, _) = of_file(&RUN, &["check"]);
     assert_eq!(trace("run.log.gz", &packed, &["check"]).1, expected);
-    // Half of it: what there is is shown, and that it is not all.
+    // Half of it: the readable part is shown, and reported as incomplete.
     let (code, decoded, messages) = trace("half.gz", &packed[..packed.len() / 2], &["decode"]);
     assert_eq!(code, 1);
     assert!(
@@ -303,7 +303,7 @@ fn compressed_logs_and_our_own_formats_are_read() {
     }
 }
 
-/// The header of an ASC file is in local time, for which its readers take it.
+/// The header of an ASC file is in local time, as its readers expect.
 #[test]
 fn asc_is_in_local_time() {
     let path = FOLDER.path().join("zone.log");

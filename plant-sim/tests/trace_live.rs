@@ -1,4 +1,4 @@
-//! Where `plant-sim trace` reads from and writes to: live pipes, signals, files that must stay.
+//! Inputs and outputs of `plant-sim trace`: live pipes, signals, files that must be kept.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process};
 
-/// Frames of a neighbour, which the protocol does not know.
+/// Frames of a foreign node, unknown to the protocol.
 const FOREIGN: &str = "(1.000000) can0 123#00\n(1.100000) can0 123#01 T\n(1.300000) can0 124#\n";
 
 /// `plant-sim trace` with these arguments: exit code, output, messages.
@@ -24,7 +24,7 @@ fn trace(arguments: &[&str]) -> (i32, String, String) {
     )
 }
 
-/// The same of what comes through a pipe.
+/// The same with input from a pipe.
 fn piped(subcommand: &str) -> Child {
     Command::new(env!("CARGO_BIN_EXE_plant-sim"))
         .args(["trace", subcommand, "-"])
@@ -79,7 +79,7 @@ fn a_format_and_a_time_both_go_to_convert() {
     }
 }
 
-/// Every line is decoded when it comes, though the pipe stays open and the decoder's buffer is far from full.
+/// Every line is decoded on arrival, although the pipe stays open and the decoder's buffer is far from full.
 #[test]
 fn a_live_pipe_is_decoded_as_it_comes() {
     let mut child = piped("decode");
@@ -101,9 +101,9 @@ fn a_signal_shows_what_there_is() {
         let mut child = piped(subcommand);
         let mut input = child.stdin.take().unwrap();
         input.write_all(FOREIGN.as_bytes()).unwrap();
-        // Half a line, which is not there yet.
+        // Half a line: still incomplete.
         input.write_all(b"(1.400000) can0 12").unwrap();
-        // The process must have its handler; a moment is enough, and a late machine only fails to prove it.
+        // The process must have installed its handler; a moment suffices, and a slow machine only weakens the test.
         std::thread::sleep(Duration::from_millis(500));
         kill_process(Pid::from_child(&child), signal).unwrap();
         let mut text = String::new();

@@ -1,4 +1,4 @@
-//! A node that network management resets counts from its start: neither check nor statistics take that for an offence.
+//! A node reset by network management counts from its start: neither check nor statistics treat that as a violation.
 
 use firmware::mechanics::arm::IRB_930;
 use plant_sim::check::{Checker, Offence};
@@ -22,7 +22,7 @@ fn record(time_us: u64, message: Message, counter: u8) -> Record {
     }
 }
 
-/// Five samples from `start` on; the counters of feedback and command begin as told.
+/// Five samples from `start` on; the counters of feedback and command begin as given.
 fn samples(start: u64, first: u32, feedback: u8, command: u8) -> Vec<Record> {
     let pair = |n: u8| {
         let time = start + 1000 * u64::from(n);
@@ -77,7 +77,7 @@ fn the_controller_begins_anew_after_its_reset() {
         assert_eq!(offence(&with(node)), None);
         assert_eq!(stale(&with(node)), 0);
     }
-    // Nobody or another was reset: then the command is an old one.
+    // No node or another one was reset: then the command is an old one.
     for records in [
         [&before[..], &after].concat(),
         with(Node::Drives.code()),
@@ -95,13 +95,13 @@ fn the_controller_begins_anew_after_its_reset() {
     }
 }
 
-/// Drives that start again number their samples anew, after a time in which nothing is due.
+/// Restarted drives number their samples anew, after a time in which nothing is due.
 #[test]
 fn the_drives_begin_anew_after_their_reset() {
     let before = samples(0, 1000, 200, 0);
     let after = samples(2_000_000, 0, 0, 5);
     let with = |node| [&before[..], &[reset(4_900, node)], &after].concat();
-    // The controller, too, had nothing to answer.
+    // The controller had nothing to answer either.
     assert_eq!(offence(&with(0)), None);
     assert!(offence(&with(Node::Controller.code())).is_some());
     assert_eq!(stale(&with(0)), 0);

@@ -16,7 +16,7 @@ fn the_version_names_the_commit() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
     let mut git = Command::new("git");
     git.args(["-C", root, "log", "-1", "--abbrev=7", "--format=%h, %cs"]);
-    // Sources without a repository of their own have no commit, even inside of somebody else's.
+    // Sources without a repository of their own have no commit, even inside another one.
     let commit = std::path::Path::new(root)
         .join(".git")
         .exists()

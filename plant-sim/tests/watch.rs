@@ -1,4 +1,4 @@
-//! `plant-sim run --listen`: every client is served as an adapter would, from the first to the last.
+//! `plant-sim run --listen`: every client is served as by an adapter, from the first to the last.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -19,7 +19,7 @@ fn line(input: &mut BufReader<TcpStream>) -> String {
     String::from_utf8(line).unwrap()
 }
 
-/// The next line that is no frame.
+/// The next line that is not a frame.
 fn answer(input: &mut BufReader<TcpStream>) -> String {
     loop {
         let line = line(input);
@@ -31,7 +31,7 @@ fn answer(input: &mut BufReader<TcpStream>) -> String {
 
 #[test]
 fn every_client_of_a_watched_run_is_served() {
-    // A free port, of those that the system hands out in turn.
+    // A free port, assigned by the system.
     let server = TcpListener::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()
@@ -60,7 +60,7 @@ fn every_client_of_a_watched_run_is_served() {
     first.write_all(b"O\r").unwrap();
     assert_eq!(line(&mut heard_by_first), "\r");
     assert!(line(&mut heard_by_first).starts_with(['t', 'b']));
-    // The run goes on in the time of the clock; the second comes later.
+    // The run continues in real time; the second client connects later.
     let (mut second, mut heard_by_second) = client();
     second.write_all(b"V\rO\r").unwrap();
     assert_eq!(answer(&mut heard_by_second), "V1010\r");
@@ -70,13 +70,13 @@ fn every_client_of_a_watched_run_is_served() {
     }
     second.write_all(b"t0010\r").unwrap();
     assert_eq!(answer(&mut heard_by_second), "\x07");
-    // A client that closed hears no more frames, but is still answered.
+    // A client that has closed receives no more frames, but is still answered.
     first.write_all(b"C\rV\r").unwrap();
     assert_eq!(answer(&mut heard_by_first), "\r");
     assert_eq!(line(&mut heard_by_first), "V1010\r");
     drop((first, heard_by_first));
     assert!(line(&mut heard_by_second).starts_with(['t', 'b']));
     drop((second, heard_by_second));
-    // Without any client it ends as it would have.
+    // Without any client the run ends normally.
     assert!(run.wait().unwrap().success());
 }

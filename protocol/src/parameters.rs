@@ -212,7 +212,7 @@ const fn check_table(mut table: &[Parameter], first: u16, last: u16) {
         assert!(rule.number as u32 >= least && rule.number <= last);
         least = rule.number as u32 + 1;
         assert!(rule.lower.is_finite() && rule.upper.is_finite());
-        // `Rule::check` tells whole numbers from fractions as u32.
+        // `Rule::check` distinguishes whole numbers from fractions as u32.
         assert!(!matches!(rule.kind, Kind::Whole) || rule.lower >= 0.0);
         if let Some(default) = parameter.default {
             assert!(rule.check(default.at(1e-4), 1e-4).is_ok());

@@ -21,7 +21,7 @@ pub enum State {
     Enabled,
     /// Under torque, on a move.
     Moving,
-    /// The operator has asked for a stop on the path.
+    /// The operator has requested a stop on the path.
     QuickStop,
     /// Torque holds the arm while the brake closes; samples left.
     Disabling(u32),
@@ -31,7 +31,7 @@ pub enum State {
     EStop(Halt),
 }
 
-/// How far a latched stop has come.
+/// Progress of a latched stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Halt {
     /// Coming to rest on the path.
@@ -258,7 +258,7 @@ impl State {
         }
     }
 
-    /// How far a latched stop has come; `None` without one.
+    /// Progress of a latched stop; `None` without one.
     pub const fn halt(self) -> Option<Halt> {
         match self {
             Self::Fault(halt) | Self::EStop(halt) => Some(halt),

@@ -56,7 +56,7 @@ fn cycle(offsets: &[f64], moving: std::ops::Range<usize>) -> Metrics {
 
 #[test]
 fn a_turn_on_the_spot_takes_its_time() {
-    // Stands at 0 s, moves at 1 to 3 s, within 10 mrad from 4 s on, within 0.1 mrad from 6 s on.
+    // At rest at 0 s, moving at 1 to 3 s, within 10 mrad from 4 s on, within 0.1 mrad from 6 s on.
     let metrics = cycle(&[1.0, 0.9, 0.5, 0.02, 0.009, 2e-4, 9e-5, -5e-5], 1..4);
     let result = metrics.cycles[0];
     assert!(result.moved);
@@ -135,7 +135,7 @@ fn the_longest_time_at_the_limit_is_kept_by_axis() {
     assert_eq!(metrics.longest_saturation, [0, 3, 1, 0]);
 }
 
-/// A controller computes in single precision: the limit that it keeps to may be a rounding above or below the true one.
+/// A controller computes in single precision: its limit may be a rounding above or below the true one.
 #[test]
 fn a_request_of_the_limit_in_single_precision_is_at_the_limit() {
     let mut model = RobotModel::irb_930_22_105();
@@ -148,7 +148,7 @@ fn a_request_of_the_limit_in_single_precision_is_at_the_limit() {
         plant.set_torque_enabled(true);
         assert_eq!(plant.at_limit(), [true, true, false, false], "{limit}");
     }
-    // Faster than the motor can drive, it gives nothing: that is all it can. It can brake.
+    // Beyond its speed limit a motor gives no driving torque, which is its limit; it can still brake.
     plant_beyond_its_speed(&model, 0.1, true);
     plant_beyond_its_speed(&model, -0.1, false);
 }

@@ -1,4 +1,4 @@
-//! `plant-sim cost`: what the controller costs on the emulated Cortex-M4F.
+//! `plant-sim cost`: cost of the controller on the emulated Cortex-M4F.
 
 use std::cell::RefCell;
 use std::fmt::Write as _;
@@ -34,7 +34,7 @@ pub(super) struct CostArgs {
     /// The image of the controller, instead of the one built from the sources.
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
-    /// The image that tells phases apart, instead of the one built from the sources.
+    /// The image that measures phases, instead of the one built from the sources.
     #[arg(long, value_name = "FILE")]
     cost_image: Option<PathBuf>,
     /// Print the figures as JSON.
@@ -42,8 +42,8 @@ pub(super) struct CostArgs {
     json: bool,
 }
 
-/// Runs two cycles with either image and shows instructions by kind of call and by phase: the second cycle is planned
-/// while the first is still running. The count is that of the emulator, the same in every run.
+/// Runs two cycles with each image and shows instructions by kind of call and by phase: the second cycle is planned
+/// while the first is still running. The emulator's counts are the same in every run.
 pub(super) fn run(args: &CostArgs) -> Result<ExitCode, String> {
     let whole = measure(args, args.image.as_ref(), IMAGE)?;
     let parts = measure(args, args.cost_image.as_ref(), COST_IMAGE)?;
@@ -116,7 +116,7 @@ impl Report {
             let of_phase = |(index, poll): (usize, &Poll)| {
                 let counts = match phase {
                     Phase::Planning => kind(index, poll) == "sample_planning",
-                    // Without torque there is no law, and little else.
+                    // Without torque there is no law and little else.
                     _ => poll.phases[Phase::Law as usize] > 0,
                 };
                 counts.then_some(poll.phases[phase as usize])
@@ -156,7 +156,7 @@ impl Report {
     }
 }
 
-/// Least, middle and greatest of the counts; `None` where there are none.
+/// Minimum, median and maximum of the counts; `None` if there are none.
 fn row(name: &'static str, counts: impl Iterator<Item = u32>) -> Option<Row> {
     let mut counts: Vec<u32> = counts.collect();
     counts.sort_unstable();
@@ -169,7 +169,7 @@ fn row(name: &'static str, counts: impl Iterator<Item = u32>) -> Option<Row> {
     })
 }
 
-/// Kinds of call, as the report names them.
+/// Kinds of call, as named in the report.
 const KINDS: [&str; 5] = [
     "start",
     "sample",

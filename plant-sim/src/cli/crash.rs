@@ -1,4 +1,4 @@
-//! `plant-sim crash`: faults of the controller on the emulated Cortex-M4F, and where they end.
+//! `plant-sim crash`: faults of the controller on the emulated Cortex-M4F, and how they end.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -15,12 +15,12 @@ use super::show;
 /// Arguments of `crash`.
 #[derive(Args)]
 pub(super) struct CrashArgs {
-    /// The image, instead of the one built from the sources; it has to be one that plants faults.
+    /// The image, instead of the one built from the sources; it must be one that plants faults.
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
 }
 
-/// Plants one fault after the other into a moving arm. Fails if one of them does not end in the
+/// Plants one fault after another while the arm moves. Fails if one of them does not end in the
 /// safe state.
 pub(super) fn run(args: &CrashArgs) -> Result<ExitCode, String> {
     let image = match &args.image {
@@ -52,7 +52,7 @@ pub(super) fn run(args: &CrashArgs) -> Result<ExitCode, String> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// One line a fault, and one more for each thing that is wrong.
+/// One line per fault, and one more per deviation.
 fn row(name: &str, seen: &Seen, wrong: &[String]) -> String {
     let mut text = format!("{name:<22} ");
     if let Some(stop) = &seen.stop {

@@ -16,13 +16,13 @@ pub(super) struct EvalArgs {
     /// What to compute.
     #[arg(value_enum)]
     table: Table,
-    /// The robot (a model file); the IRB 930-22/1.05 if left out.
+    /// The robot (a model file); default: the IRB 930-22/1.05.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// What the flange holds (a file with mass, com_flange_frame, inertia_com_diag).
+    /// Payload at the flange (a file with mass, com_flange_frame, inertia_com_diag).
     #[arg(long, value_name = "FILE")]
     payload: Option<PathBuf>,
-    /// Whose mathematics.
+    /// Implementation to use.
     #[arg(long, value_enum, default_value = "lagrange")]
     by: By,
 }

@@ -1,4 +1,4 @@
-//! The command line: one file a subcommand.
+//! The command line: one file per subcommand.
 
 mod arrival;
 mod cost;
@@ -21,7 +21,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-/// Development bench for a SCARA drive cabinet: the controller that goes into the cabinet against
+/// Development bench for a SCARA drive cabinet: the cabinet's controller against
 /// a simulated IRB 930, over CAN.
 #[derive(Parser)]
 #[command(name = "plant-sim", version = env!("VERSION_AND_COMMIT"), args_conflicts_with_subcommands = true)]
@@ -38,11 +38,11 @@ enum Command {
     Run(run::RunArgs),
     /// Count the instructions and the stack that the controller takes on the emulated Cortex-M4F.
     Cost(cost::CostArgs),
-    /// Plant faults into the controller on the emulated Cortex-M4F, and see where they end.
+    /// Plant faults into the controller on the emulated Cortex-M4F, and see how they end.
     Crash(crash::CrashArgs),
     /// Compute kinematics or dynamics for the rows of a CSV table on standard input.
     Eval(eval::EvalArgs),
-    /// Measure how regular the loop with an external controller is, beside what watches over it.
+    /// Measure the timing of the loop with an external controller, against the watchdog limits.
     Timing(timing::TimingArgs),
     /// Compare two runs on one page.
     Report(report::ReportArgs),
@@ -63,7 +63,7 @@ enum Command {
     Model(model::ModelArgs),
 }
 
-/// Does what the command line says. An error is one message for the person who typed it.
+/// Executes the command line. An error is one message for the user.
 pub(crate) fn main() -> Result<ExitCode, String> {
     let cli = Cli::parse();
     match cli.command {
@@ -84,7 +84,7 @@ pub(crate) fn main() -> Result<ExitCode, String> {
     }
 }
 
-/// Writes to standard output. A reader that has seen enough and gone (`| head`) is no error.
+/// Writes to standard output. A reader that has closed the pipe (`| head`) is not an error.
 fn show(text: &str) -> Result<(), String> {
     match io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {

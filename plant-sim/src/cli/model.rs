@@ -1,7 +1,7 @@
-//! `plant-sim model`: a robot for a controller in a process of its own.
+//! `plant-sim model`: a robot for a controller in another process.
 //!
-//! Model files are read and checked here alone. The controller takes what comes out: its own numbers, in its own
-//! precision, which read back bit by bit.
+//! Model files are only read and checked here. The controller takes the output: its own numbers in its own precision,
+//! which read back exactly.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -28,7 +28,7 @@ pub(super) struct ModelArgs {
 pub(super) fn run(args: &ModelArgs) -> Result<ExitCode, String> {
     let arm = ArmModel::from(&load(args.file.as_ref())?);
     arm.validate()
-        .map_err(|error| format!("the controller cannot work with this robot: {error}"))?;
+        .map_err(|error| format!("the controller cannot use this robot: {error}"))?;
     let text = serde_json::to_string_pretty(&arm).map_err(|error| error.to_string())? + "\n";
     match &args.out {
         Some(path) => output::write(path, &text).map_err(|error| error.to_string())?,

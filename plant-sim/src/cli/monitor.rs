@@ -16,9 +16,9 @@ use super::signal;
 
 /// Time between two pictures.
 const REFRESH: Duration = Duration::from_millis(100);
-/// Longest wait for a frame before keys are looked at.
+/// Longest wait for a frame before checking for keys.
 const WAIT: Duration = Duration::from_millis(20);
-/// Frames taken before picture and keys get their turn: a flooded bus must not hide itself.
+/// Frames taken before picture and keys get their turn: a flooded bus must stay visible.
 const BATCH: usize = 1024;
 
 /// Arguments of `monitor`.

@@ -1,4 +1,4 @@
-//! `plant-sim parameters`: lists and sets what can be changed over the bus.
+//! `plant-sim parameters`: lists and sets parameters over the bus.
 
 use std::process::ExitCode;
 
@@ -15,16 +15,17 @@ pub(super) struct ParametersArgs {
     /// The bus, with a controller on it: socketcan:INTERFACE, slcan:TERMINAL or slcan:tcp:HOST:PORT.
     #[arg(long, value_name = "BUS", required_unless_present = "markdown")]
     bus: Option<LinkAddress>,
-    /// Set a parameter instead of listing all; may be repeated. In force from the next sample on, until the node starts again.
+    /// Set a parameter instead of listing all; may be repeated. Takes effect from the next sample until the node
+    /// restarts.
     #[arg(long, value_name = "NAME=VALUE", conflicts_with = "server")]
     set: Vec<Assignment>,
-    /// Whose parameters: both, unless said otherwise.
+    /// Whose parameters; default: both.
     #[arg(long, value_name = "SERVER")]
     server: Option<ServerChoice>,
     /// Print JSON instead of text.
     #[arg(long)]
     json: bool,
-    /// Print the table of parameters as docs/parameters.md has it; needs no bus.
+    /// Print the table of parameters for docs/parameters.md; needs no bus.
     #[arg(long, conflicts_with_all = ["bus", "set", "server", "json"])]
     markdown: bool,
 }
@@ -35,7 +36,7 @@ enum ServerChoice {
     Drives,
 }
 
-/// Lists, or sets.
+/// Lists or sets parameters.
 pub(super) fn run(args: &ParametersArgs) -> Result<ExitCode, String> {
     let Some(bus) = &args.bus else {
         show(&parameters::markdown())?;
@@ -48,7 +49,7 @@ pub(super) fn run(args: &ParametersArgs) -> Result<ExitCode, String> {
     } else {
         set(&mut client, &args.set, &mut readings)
     };
-    // What was read or set before an error is worth knowing.
+    // Show what was read or set before an error.
     if !readings.is_empty() {
         show(&if args.json {
             parameters::json(&readings, client.period())
@@ -70,7 +71,7 @@ fn list(
     }
     if server != Some(ServerChoice::Controller) {
         match client.list(Server::Drives) {
-            // A controller may be set up before its drives are there.
+            // A controller may be configured before its drives are present.
             Err(error @ ClientError::DrivesSilent { .. }) if server.is_none() => {
                 eprintln!("plant-sim: {error}");
             }

@@ -40,7 +40,7 @@ pub(super) struct RunArgs {
     /// Payload, announced and carried from the start.
     #[arg(long, value_name = "KG")]
     payload: Option<f64>,
-    /// How often the cycle is repeated.
+    /// Number of cycles.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(scenario::MAX_CYCLES)))]
     cycles: Option<u32>,
     /// Control rate.
@@ -55,25 +55,25 @@ pub(super) struct RunArgs {
     #[arg(long)]
     real_time: bool,
     /// Where the controller runs: in this process, as an image on an emulated Cortex-M4F, or
-    /// external, on the other end of --bus. The last two are held against the one in this process
+    /// external, on the other end of --bus. The last two are compared with the one in this process
     /// byte for byte.
     #[arg(long, value_name = "WHERE", default_value = "in-process")]
     controller: ControllerChoice,
     /// The image for --controller qemu, instead of the one built from the sources.
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
-    /// How frames get to the controller in QEMU: in records, fast, or as slcan over its UART.
+    /// How frames reach the controller in QEMU: as records (fast), or as slcan over its UART.
     #[arg(long, value_name = "CHANNEL", default_value = "fifo")]
     channel: ChannelChoice,
-    /// Show the built-in bus to CAN tools: they connect to slcan:tcp:HOST:PORT and take it for an
-    /// adapter. The run waits for the first and goes at the speed of the clock.
+    /// Show the built-in bus to CAN tools, which connect to slcan:tcp:HOST:PORT as to an adapter. The
+    /// run waits for the first one and then runs in real time.
     #[arg(long, value_name = "slcan:tcp:HOST:PORT")]
     listen: Option<LinkAddress>,
-    /// The robot that the controller believes in (a model file); also the true one, unless
-    /// --plant-model says otherwise. Configure an external controller alike: plant-sim model FILE.
+    /// The robot as the controller knows it (a model file); also the actual one, unless --plant-model
+    /// is given. Configure an external controller the same way: plant-sim model FILE.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The robot as it is (a model file).
+    /// The actual robot (a model file).
     #[arg(long, value_name = "FILE")]
     plant_model: Option<PathBuf>,
     /// Where trace.log, truth.csv, summary.json and report.html go; with --controller qemu controller.log, too.
@@ -211,7 +211,10 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, String> {
             );
             if let Some(controller) = &controller {
                 eprint!("{}", clock.timing().report());
-                eprintln!("  commands unlike the twin's {}", controller.different());
+                eprintln!(
+                    "  commands different from the twin's {}",
+                    controller.different()
+                );
             }
             results
         }
@@ -257,13 +260,13 @@ fn keep_log(controller: &mut Qemu, path: &Path) {
         .and_then(|log| fs::write(path, log).map_err(|error| error.to_string()));
     if let Err(error) = written {
         eprintln!(
-            "plant-sim: the controller's log is not in {}: {error}",
+            "plant-sim: cannot write the controller's log to {}: {error}",
             path.display()
         );
     }
 }
 
-/// Where the controller is, with what that needs.
+/// Where the controller runs, with its options.
 enum Place<'a> {
     InProcess,
     Watched(&'a str),
@@ -272,7 +275,7 @@ enum Place<'a> {
     RealTime(&'a LinkAddress),
 }
 
-/// Puts together what belongs together: a link and an external controller need each other.
+/// Checks that options belong together: a link and an external controller need each other.
 fn place(args: &RunArgs) -> Result<Place<'_>, String> {
     if args.listen.is_some() && !matches!(args.controller, ControllerChoice::InProcess) {
         return Err("--listen shows the built-in bus of a controller in this process; the bus of an external one can be watched itself".into());

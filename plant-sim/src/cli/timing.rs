@@ -1,4 +1,4 @@
-//! `plant-sim timing`: how regular the loop is on this machine and this bus.
+//! `plant-sim timing`: timing of the loop on this machine and this bus.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

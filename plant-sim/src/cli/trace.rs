@@ -1,4 +1,4 @@
-//! `plant-sim trace`: looks into recorded traces.
+//! `plant-sim trace`: inspects recorded traces.
 //!
 //! Every subcommand reads its trace once, from front to end, in bounded memory.
 
@@ -34,7 +34,7 @@ pub(super) enum TraceCommand {
     Stats(StatsArgs),
     /// Draw positions, errors, torques, modes and faults over time (SVG).
     Plot(PlotArgs),
-    /// Judge the trace by the rules of the protocol; name the first offence.
+    /// Check the trace against the rules of the protocol; report the first violation.
     Check(CheckArgs),
     /// Feed the trace into a fresh controller and compare its commands byte for byte; or, with --bus, play it onto a bus.
     Replay(ReplayArgs),
@@ -42,7 +42,7 @@ pub(super) enum TraceCommand {
     Convert(ConvertArgs),
 }
 
-/// Does what the subcommand says.
+/// Executes the subcommand.
 pub(super) fn run(command: &TraceCommand) -> Result<ExitCode, String> {
     match command {
         TraceCommand::Decode(args) => decode(args),

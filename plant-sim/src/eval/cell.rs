@@ -1,4 +1,4 @@
-//! Results, and how they are printed.
+//! Results and their text form.
 
 use nalgebra::Vector4;
 use std::fmt;
@@ -28,7 +28,7 @@ impl fmt::Display for Cell {
         match self {
             Self::Double(number) if number.is_nan() => f.write_str("nan"),
             Self::Single(number) if number.is_nan() => f.write_str("nan"),
-            // The debug form round-trips as the plain one does, but writes 1e-300 in seven characters.
+            // The debug form round-trips like the plain one, but writes 1e-300 with seven characters.
             Self::Double(number) => write!(f, "{number:?}"),
             Self::Single(number) => write!(f, "{number:?}"),
             Self::Flag(flag) => write!(f, "{}", u8::from(*flag)),
@@ -37,7 +37,8 @@ impl fmt::Display for Cell {
     }
 }
 
-/// Whether a pose can be reached; of two solutions the better one, which is the lesser here, decides.
+/// Whether a pose can be reached; of two solutions the better one decides, which is the
+/// lesser in this order.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Reach {
     Ok,

@@ -86,7 +86,7 @@ impl Controller {
         }
     }
 
-    /// The wrapped solution, which the limits are judged by but which is not moved onto them.
+    /// The wrapped solution, compared with the limits but not clamped to them.
     fn solution(&self, pose: &Pose, elbow: Elbow) -> (Vector4<f32>, Reach) {
         let reach = match inverse(&self.arm, pose, elbow, &Vector4::zeros()) {
             Ok(_) => Reach::Ok,
@@ -103,7 +103,7 @@ fn single(vector: &Vector4<f64>) -> Vector4<f32> {
     vector.map(|x| x as f32)
 }
 
-/// As that of the plant with the last bit of an f32, 2^29 times as large; elsewhere some roundings of pi.
+/// Like that of the plant, with the last bit of an f32, 2^29 times as large; elsewhere some roundings of pi.
 fn theta2_tolerance(theta2: f32) -> f32 {
     (1e-6 / theta2.abs()).clamp(2e-6, 1.2e-3)
 }
@@ -190,7 +190,7 @@ impl Side for Controller {
 impl From<IkError> for Reach {
     fn from(error: IkError) -> Self {
         match error {
-            // Inputs are checked to be finite; a radius that overflows is far.
+            // Inputs are finite; a radius that overflows is too far.
             IkError::TooFar { .. } | IkError::NotFinite => Self::TooFar,
             IkError::TooNear { .. } => Self::InsideHole,
             IkError::Limit { axis, value, limit } => match axis {

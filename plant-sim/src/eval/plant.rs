@@ -24,8 +24,8 @@ impl PlantSide {
     }
 }
 
-/// How far theta2 may be off (rad) when the radius is off by its last bits: 2e-15 / |theta2| towards the stretched arm,
-/// where it ends at the root of that; elsewhere the plant promises 1e-9.
+/// Error of theta2 (rad) for an error of the radius in its last bits: 2e-15 / |theta2| towards the stretched arm, at
+/// most the root of 2e-15; elsewhere the plant guarantees 1e-9.
 fn theta2_tolerance(theta2: f64) -> f64 {
     (2e-15 / theta2.abs()).clamp(1e-9, 5e-8)
 }
@@ -38,7 +38,7 @@ impl Side for PlantSide {
     fn kinematics(&self, q: &Vector4<f64>, qd: &Vector4<f64>) -> Vec<Cell> {
         let at = self.arm.at(q);
         let Pose { x, y, z, yaw } = self.arm.pose(&at);
-        // nalgebra iterates down the columns, the table goes along the rows.
+        // nalgebra iterates down the columns, but the table is by rows.
         let rotation = self.arm.flange(&at).1.transpose();
         let jacobian = self.arm.jacobian(&at).transpose();
         [x, y, z, yaw]

@@ -1,4 +1,4 @@
-//! Which columns each table has, and where they stand in an input.
+//! Columns of each table, and their positions in an input.
 
 use super::{EvalError, Table};
 
@@ -12,7 +12,7 @@ impl Table {
         }
     }
 
-    /// Columns that are passed on as they are.
+    /// Columns passed on unchanged.
     fn labels(self) -> &'static [&'static str] {
         match self {
             Self::Kinematics | Self::Actuation => &["id"],
@@ -21,7 +21,7 @@ impl Table {
         }
     }
 
-    /// Columns that are computed.
+    /// Computed columns.
     pub(super) fn results(self) -> Vec<String> {
         let plain = |names: &[&str]| {
             names
@@ -83,7 +83,7 @@ fn matrix(prefix: &str, rows: usize, columns: usize) -> Vec<String> {
         .collect()
 }
 
-/// Where the columns of a table stand in an input.
+/// Positions of a table's columns in an input.
 pub(super) struct Layout {
     inputs: Vec<usize>,
     /// Columns to pass on.
@@ -148,7 +148,7 @@ impl Layout {
         }
         let number = |&column: &usize| {
             let text = &record[column];
-            // NaN and infinities parse, but are no states of a robot; neither is what an f32 cannot hold.
+            // NaN and infinities parse but are not states of a robot, nor are numbers beyond the range of an f32.
             let number = text.parse().ok().filter(|x: &f64| x.abs() <= self.largest);
             number.ok_or_else(|| wrong(column, text))
         };

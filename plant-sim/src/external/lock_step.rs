@@ -22,19 +22,19 @@ use crate::twin::Twin;
 pub struct LockStep {
     remote: Remote,
     twin: Twin,
-    /// Whether the first command has come: what a controller says before it may belong to its past.
+    /// Whether the first command has arrived: earlier frames may be from the time before the restart.
     begun: bool,
-    /// Whether the twin still knows all that the controller knows.
+    /// Whether the twin still has the same input as the controller.
     follows: bool,
     /// Whether the controller has let a whole [`ANSWER_LIMIT`] pass.
     late: bool,
     period: time::Duration,
-    /// What the controller has sent, empty between calls.
+    /// Frames sent by the controller; empty between calls.
     sent: Vec<CanFrame>,
 }
 
 impl LockStep {
-    /// Waits for a controller on the bus and makes it start afresh.
+    /// Waits for a controller on the bus and resets it.
     ///
     /// # Errors
     /// The bus cannot be used, another plant is on it, or no controller answers within a minute.
@@ -50,7 +50,7 @@ impl LockStep {
         })
     }
 
-    /// Takes what has come; the controller's frames are compared and handed on.
+    /// Takes the frames that have arrived; those of the controller are compared and passed on.
     fn take(&mut self) -> Result<(), PeerError> {
         while let Some(frame) = self.remote.link.receive() {
             match sender(&frame) {
@@ -58,8 +58,8 @@ impl LockStep {
                 Some(Name::Drives | Name::Operator) => {
                     return Err(self.remote.second_plant(&frame));
                 }
-                // Somebody else has spoken, an emergency stop or a parameter request perhaps, and only the controller knows
-                // when it heard it.
+                // Another node has sent a frame, such as an emergency stop or a parameter request, and only the
+                // controller knows when it received it.
                 None => self.follows = false,
             }
         }
@@ -76,8 +76,8 @@ impl LockStep {
         if self.follows {
             self.twin.compare(frame).map_err(|difference| {
                 self.remote.error(format!(
-                    "differs from its twin in this process {}: {difference}. Both must be built from one source and \
-                     have one robot (--model) and one rate (--rate); a controller in real time needs a plant in real \
+                    "differs from its twin in this process {}: {difference}. Both must be built from the same source and \
+                     have the same robot (--model) and rate (--rate); a controller in real time needs a plant in real \
                      time (--real-time)",
                     self.place()
                 ))
@@ -94,17 +94,17 @@ impl LockStep {
         format!("at {}.{:03} s", ms / 1000, ms % 1000)
     }
 
-    /// What a controller says when it starts cannot be distinguished from what it said before: the twin says it.
+    /// Frames of a starting controller cannot be distinguished from earlier ones, so the twin's are used.
     fn start(&mut self, now: Instant) {
         self.twin.call(now, None);
         self.sent.extend(self.twin.due().drain(..));
     }
 
-    /// Hands a frame over and waits for all that the twin answers.
+    /// Sends a frame and waits for all answers of the twin.
     fn exchange(&mut self, now: Instant, frame: &CanFrame) -> Result<(), PeerError> {
         self.twin.call(now, Some(frame));
         self.remote.send(frame);
-        // Feedback is answered by a command in every case; what else is answered, only a twin that follows knows.
+        // Feedback is always answered by a command; other answers are only known while the twin follows.
         let commanded = table::FEEDBACK.identifies(frame) && !self.late;
         let patience = if self.follows || commanded {
             ANSWER_LIMIT
@@ -118,7 +118,7 @@ impl LockStep {
             if left.is_zero() || self.remote.lost.is_some() {
                 if self.follows && self.remote.lost.is_none() {
                     eprintln!(
-                        "plant-sim: the controller on {} is late {}: no answer to {frame} within {} s; going on",
+                        "plant-sim: the controller on {} is late {}: no answer to {frame} within {} s; continuing",
                         self.remote.bus,
                         self.place(),
                         ANSWER_LIMIT.as_secs()
@@ -138,7 +138,7 @@ impl LockStep {
 
 impl Peer for LockStep {
     fn wake(&self) -> Option<Instant> {
-        // Between samples there is nothing that a link could say about the time.
+        // Between samples the link gives no indication of the time.
         self.twin.controller().is_new().then_some(Instant::ORIGIN)
     }
 

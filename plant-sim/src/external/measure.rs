@@ -1,4 +1,4 @@
-//! The real-time loop by itself: drives at rest, a controller that answers, and a clock.
+//! The real-time loop by itself: drives at rest, an answering controller, and a clock.
 
 use std::time::Duration;
 
@@ -13,8 +13,8 @@ use sim::rig::{Rig, RigConfig, RunError};
 use super::timing::Timing;
 use super::{RealTime, WallClock};
 
-/// Exchanges feedback and commands with the controller on `bus`, `rate_hz` times a second for `time`. The brake stays
-/// closed: nothing moves, and the controller is never asked to.
+/// Exchanges feedback and commands with the controller on `bus`, `rate_hz` times per second for `time`. The brake stays
+/// closed and no motion is requested.
 ///
 /// # Errors
 /// The bus or the controller fails; see [`RealTime::connect`].

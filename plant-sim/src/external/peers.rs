@@ -12,22 +12,22 @@ use protocol::table;
 use super::Remote;
 use sim::peer::PeerError;
 
-/// How long a bus is listened to before taking part: longer than the pause between two signs of a waiting plant.
+/// Time to listen on a bus before taking part: longer than the interval between two frames of a waiting plant.
 const LISTEN: Duration = Duration::from_millis(300);
-/// Between two requests to start afresh while no controller answers.
+/// Interval of reset requests while no controller answers.
 const RETRY: Duration = Duration::from_millis(200);
 /// Longest wait for a controller.
 const MEET_LIMIT: Duration = Duration::from_secs(60);
 
-/// Node that sends this frame, if only one may. A parameter request may come from a tool beside the operator
-/// (`plant-sim parameters`), and makes no second plant.
+/// Node that sends this frame, if only one may. A parameter request may come from another tool
+/// (`plant-sim parameters`) and does not indicate a second plant.
 pub(crate) fn sender(frame: &CanFrame) -> Option<Name> {
     table::of_frame(frame)
         .filter(|info| info.id != table::CONTROLLER_PARAMETER_REQUEST.id)
         .and_then(|info| info.sender)
 }
 
-/// Opens the bus, makes sure that no other plant is on it, and waits until a controller is, which starts afresh.
+/// Opens the bus, makes sure that no other plant is on it, and waits for a controller, which is reset.
 pub(crate) fn meet(address: &LinkAddress) -> Result<Remote, PeerError> {
     let bus = address.to_string();
     let link = Link::open(address).map_err(|error| PeerError {
@@ -44,14 +44,14 @@ pub(crate) fn meet(address: &LinkAddress) -> Result<Remote, PeerError> {
     let began = Instant::now();
     let mut told = false;
     loop {
-        // A waiting plant is heard by another that starts.
+        // Lets another plant that starts detect this one while it waits.
         remote.send(&reset());
         if hear(&mut remote, RETRY, true)? {
-            // Whether the controller has heard that or has just started by itself cannot be known: it starts afresh
-            // now, and the first sample comes after.
+            // The controller may have received that or have just started by itself: it is reset now, before the first
+            // sample.
             remote.send(&reset());
             if told {
-                eprintln!("plant-sim: the controller is there");
+                eprintln!("plant-sim: the controller is present");
             }
             remote.met = true;
             return Ok(remote);
@@ -69,7 +69,7 @@ pub(crate) fn meet(address: &LinkAddress) -> Result<Remote, PeerError> {
     }
 }
 
-/// Listens until the time is over or, if asked for, a controller speaks: `true` then.
+/// Listens until the time is over or, if `controller`, until a controller sends: `true` then.
 fn hear(remote: &mut Remote, time: Duration, controller: bool) -> Result<bool, PeerError> {
     let end = Instant::now() + time;
     loop {
@@ -98,7 +98,7 @@ fn hear(remote: &mut Remote, time: Duration, controller: bool) -> Result<bool, P
     }
 }
 
-/// "Start afresh", to the controller.
+/// Reset command to the controller.
 pub(crate) fn reset() -> CanFrame {
     codec::encode(&Message::Nmt(Nmt::reset(Name::Controller)), 0).expect("two bytes without floats")
 }

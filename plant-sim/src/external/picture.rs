@@ -5,9 +5,9 @@ use std::time::Duration;
 use super::timing::{Distribution, Timing};
 use crate::chart::Svg;
 
-/// Decades of the time axis, from 1 us on.
+/// Decades of the time axis, from 1 us up.
 const DECADES: f64 = 5.0;
-/// Bars a decade.
+/// Bars per decade.
 const BARS: usize = 20;
 const WIDTH: f64 = 800.0;
 const HEIGHT: f64 = 150.0;
@@ -53,7 +53,7 @@ fn micros(time: Duration) -> f64 {
     time.as_secs_f64() * 1e6
 }
 
-/// Place of a time on its axis; what is below 1 us stands at its beginning.
+/// Position of a time on its axis; below 1 us it is at the start.
 fn x(us: f64) -> f64 {
     LEFT + WIDTH * (us.max(1.0).log10() / DECADES).min(1.0)
 }
@@ -66,7 +66,7 @@ fn row(page: &mut Svg, top: f64, name: &str, times: &Distribution, timing: &Timi
         let bar = micros(time).max(1.0).log10() * BARS as f64;
         bars[(bar as usize).min(BARS * DECADES as usize)] += count;
     }
-    // One above the largest count's decade, so that a single sample is still a visible bar.
+    // Scaled so that a single sample is still a visible bar.
     let most = bars.iter().copied().max().unwrap_or(0).max(1) as f64;
     let decades = (most.log10().floor() + 1.0).max(1.0);
     let y = |count: f64| bottom - HEIGHT * (count.log10() + 0.3).max(0.0) / (decades + 0.3);
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use crate::chart::elements;
 
-    /// Left edge and height of every bar below `top`, the page left out.
+    /// Left edge and height of every bar below `top`, without the page itself.
     fn bars(svg: &str, top: f64) -> Vec<(f64, f64)> {
         let elements = elements(svg).into_iter();
         elements
@@ -123,8 +123,8 @@ mod tests {
             .collect()
     }
 
-    /// Bars by hand: five decades on 800 units from 70 on, so 10 us begin at 230 and 1 ms at 550. The greatest count, 20,
-    /// has one decade and the next begun: heights are (log10 n + 0.3) / 2.3 of 150.
+    /// Bars by hand: five decades on 800 units from 70 on, so 10 us begin at 230 and 1 ms at 550. The greatest count is
+    /// 20: heights are (log10 n + 0.3) / 2.3 of 150.
     #[test]
     fn bars_are_where_and_as_high_as_the_times_are() {
         let mut timing = Timing::new(Duration::from_millis(1));
@@ -142,7 +142,7 @@ mod tests {
         );
     }
 
-    /// What is shorter or longer than the axis is at its ends, and not lost.
+    /// Times beyond either end of the axis are drawn at that end, not lost.
     #[test]
     fn times_beyond_the_axis_are_in_its_outer_bars() {
         let mut timing = Timing::new(Duration::from_millis(1));

@@ -1,4 +1,4 @@
-//! Real time: samples at absolute deadlines, commands when they come.
+//! Real time: samples at absolute deadlines, commands when they arrive.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -20,7 +20,7 @@ use super::peers::{self, sender};
 use super::{Remote, WallClock};
 use crate::twin::Twin;
 
-/// Commands of the twin that are kept for comparison: a command later than this is history.
+/// Commands of the twin that are kept for comparison; later commands are not compared.
 const MEMORY: usize = 64;
 
 /// A controller behind a link, in real time.
@@ -33,17 +33,17 @@ pub struct RealTime {
     clock: WallClock,
     /// Time of the run's next sample.
     next: Instant,
-    /// When the last frame entered the bus.
+    /// Time at which the last frame entered the bus.
     last: Instant,
-    /// What has come, empty between calls.
+    /// Frames received; empty between calls.
     sent: Vec<CanFrame>,
     /// Commands that were not those of the twin.
     different: u64,
 }
 
 impl RealTime {
-    /// Waits for a controller on the bus, makes it start afresh, and asks the system for real-time scheduling. The run has
-    /// to go at the pace of `clock`.
+    /// Waits for a controller on the bus, resets it, and requests real-time scheduling. The run has to use `clock` as
+    /// its pace.
     ///
     /// # Errors
     /// The bus cannot be used, another plant is on it, or no controller answers within a minute.
@@ -74,7 +74,7 @@ impl RealTime {
         self.different
     }
 
-    /// Takes what has come; `true` when the command of the present sample is there.
+    /// Takes the frames that have arrived; `true` once the command of the current sample is there.
     fn take(&mut self) -> Result<bool, PeerError> {
         let mut answered = false;
         while let Some(frame) = self.remote.link.receive() {
@@ -96,8 +96,8 @@ impl RealTime {
         Ok(answered)
     }
 
-    /// Holds a command against the twin's. Frames that got lost on the way make the two differ for good reason: the
-    /// first difference is reported, and the run goes on.
+    /// Compares a command with the twin's. Frames lost on the way are a legitimate cause of differences: the first one
+    /// is reported, and the run continues.
     fn compare(&mut self, sample: u32, frame: &CanFrame) {
         let due = self.expected.iter().find(|(due, _)| *due == sample);
         if let Some((_, due)) = due
@@ -170,7 +170,7 @@ impl Peer for RealTime {
                 Duration::ZERO
             }
         };
-        // What is sent later does not overtake.
+        // Later frames must not overtake earlier ones.
         self.last = self
             .last
             .max(now + time::Duration::from_nanos(latency.as_nanos() as u64));

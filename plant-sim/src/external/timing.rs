@@ -1,4 +1,4 @@
-//! What a real-time loop measured: how late it woke, how long the controller took, what came too late.
+//! Measurements of a real-time loop: lateness of samples, response time of the controller, late commands.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use sim::drives::HOLD_SAMPLES;
 
 /// Width of a class of the histogram, ns.
 const CLASS_NS: u64 = 1_000;
-/// Classes; the last holds everything above. 50 ms: beyond it only the greatest value is of interest.
+/// Number of classes, up to 50 ms; the last holds everything above, where only the greatest value matters.
 const CLASSES: usize = 50_000;
 
 /// Times in classes of 1 us: bounded memory for a run of any length.
@@ -91,7 +91,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Nothing measured yet, for samples every `period`.
+    /// Empty statistics for samples every `period`.
     pub fn new(period: Duration) -> Self {
         Self {
             period,
@@ -117,12 +117,12 @@ impl Timing {
         }
     }
 
-    /// The command of a sample came this long after its feedback.
+    /// The command of a sample arrived this long after its feedback.
     pub fn answered(&mut self, latency: Duration) {
         self.latency.add(latency);
     }
 
-    /// The command of a sample had not come when the next was due.
+    /// The command of a sample had not arrived when the next was due.
     pub fn missed(&mut self) {
         self.missed += 1;
     }
@@ -132,12 +132,12 @@ impl Timing {
         self.lateness.count()
     }
 
-    /// Samples whose command had not come when the next was due.
+    /// Samples whose command had not arrived when the next was due.
     pub fn missed_commands(&self) -> u64 {
         self.missed
     }
 
-    /// Samples that were taken a whole period late or more.
+    /// Samples taken a whole period late or more.
     pub fn overruns(&self) -> u64 {
         self.overruns
     }
@@ -147,7 +147,7 @@ impl Timing {
         self.period
     }
 
-    /// What watches over the loop, and when it acts.
+    /// Watchdogs of the loop and their limits.
     pub fn limits(&self) -> [(&'static str, Duration); 4] {
         [
             ("command before the next sample", self.period),
@@ -156,11 +156,11 @@ impl Timing {
                 "controller bridges missing samples",
                 Duration::from_millis(u64::from(MAX_GAP_MS)),
             ),
-            ("controller takes drives for silent", PEER_TIMEOUT.into()),
+            ("controller finds drives silent", PEER_TIMEOUT.into()),
         ]
     }
 
-    /// Percentiles, and what was measured beside each limit that watches over it.
+    /// Percentiles, and the measurement beside each watchdog limit.
     pub fn report(&self) -> String {
         let mut text = String::new();
         let us = |time: Duration| time.as_secs_f64() * 1e6;
@@ -191,7 +191,7 @@ impl Timing {
             text,
             "watchdogs                             limit   measured     margin  us"
         );
-        // Until a sample was late and its command after that, whatever was watched has waited this long.
+        // The worst wait of a watchdog: a late sample, then its late command.
         let worst = self.lateness.max() + self.latency.max();
         let gap = self.period + self.jitter.max();
         for ((name, limit), measured) in self.limits().into_iter().zip([worst, worst, gap, gap]) {

@@ -1,4 +1,4 @@
-//! Real time as a pace: samples at absolute deadlines of the machine's clock.
+//! Real-time pace: samples at absolute deadlines of the machine's clock.
 
 use std::cell::{Ref, RefCell};
 use std::io;
@@ -28,7 +28,7 @@ struct Samples {
 }
 
 impl WallClock {
-    /// Before the first sample.
+    /// A clock before the first sample.
     pub fn new(period: Period) -> Self {
         let period = period.duration().into();
         Self(Rc::new(RefCell::new(Samples {
@@ -39,7 +39,7 @@ impl WallClock {
         })))
     }
 
-    /// What was measured so far.
+    /// Measurements so far.
     pub fn timing(&self) -> Ref<'_, Timing> {
         Ref::map(self.0.borrow(), |samples| &samples.timing)
     }
@@ -55,12 +55,12 @@ impl WallClock {
         samples.origin.unwrap_or_default() + samples.period * (samples.number + 1)
     }
 
-    /// The command of the present sample came this long after its feedback.
+    /// The command of the current sample arrived this long after its feedback.
     pub fn answered(&self, latency: Duration) {
         self.0.borrow_mut().timing.answered(latency);
     }
 
-    /// The command of the present sample had not come when the next was due.
+    /// The command of the current sample had not arrived when the next was due.
     pub fn missed(&self) {
         self.0.borrow_mut().timing.missed();
     }
@@ -81,7 +81,7 @@ impl Pace for WallClock {
         let now = monotonic();
         samples.timing.woke(deadline, now);
         if now >= deadline + samples.period {
-            // Samples that were missed are not made up for in a burst: time slips, and the controller gets its share.
+            // Missed samples are not made up for in a burst: time slips instead, which leaves the controller its time.
             samples.origin = Some(now.saturating_sub(samples.period * samples.number));
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Parameters as people and programs read them.
+//! Parameters as text, JSON and Markdown.
 
 use std::fmt::Write as _;
 
@@ -15,7 +15,7 @@ macro_rules! line {
     }};
 }
 
-/// Range and unit, where the node has said its range.
+/// Unit, and the range as reported by the node.
 pub(super) fn allowed(reading: &Reading) -> String {
     let kind = match reading.parameter {
         Some(parameter) if parameter.rule.kind == Kind::Whole => "whole numbers from ",
@@ -33,7 +33,7 @@ fn name(reading: &Reading) -> String {
     }
 }
 
-/// One line for each parameter, under a heading; `period` is the sampling period, s.
+/// One line per parameter, under a heading; `period` is the sampling period, s.
 #[must_use]
 pub fn table(readings: &[Reading], period: f32) -> String {
     let mut text = String::new();
@@ -82,10 +82,10 @@ struct Row {
     about: &'static str,
 }
 
-/// The same as a JSON array; `default` is null for readings, `settable` for what this program does not know.
+/// The same as a JSON array; `default` is null for readings, `settable` for parameters unknown to this program.
 ///
 /// # Panics
-/// Never: every number is finite, as it came over the bus.
+/// Never: every number from the bus is finite.
 #[must_use]
 pub fn json(readings: &[Reading], period: f32) -> String {
     let rows: Vec<Row> = readings
@@ -121,23 +121,23 @@ pub fn markdown() -> String {
     let mut text = String::from(
         "# Parameters
 
-What can be read and set over the bus, made from the table in
+Parameters that can be read and set over the bus, generated from the table in
 [protocol/src/parameters/list.rs](../protocol/src/parameters/list.rs) by `plant-sim parameters --markdown`.
 
     plant-sim parameters --bus socketcan:vcan0                                       # list
-    plant-sim parameters --bus slcan:tcp:localhost:29536 --set bandwidth=120 --json  # set, and show what is in force
+    plant-sim parameters --bus slcan:tcp:localhost:29536 --set bandwidth=120 --json  # set, and show the new value
 
-- The operator asks the controller (identifiers 0x641 and 0x5C1). Numbers from 0x1000 on belong to the drives: the controller
-  passes requests on (0x640) and their answers back (0x5C0).
-- A new value is in force from the next sample on, and until its node starts again: then it has its default. A run with an
-  external controller starts it again.
-- *Settable at rest*: for the controller ready, or enabled with no move planned or under way; for the drives, torque off. Otherwise
-  the answer is `not-now`. It is also the answer to a set in the first frame that a node hears, which may be a recording,
-  and to requests for drives that are silent.
-- Corner frequencies are bounded by the sampling rate: beyond a quarter of a radian per sample, no phase is left for the delays of
-  sampling and bus.
-- `plant-sim parameters` sends with the operator's identifier. It looks for a place in the operator's counter by itself; an operator
-  that asks for parameters at the same time may lose requests, and has to repeat them.
+- The operator asks the controller (identifiers 0x641 and 0x5C1). Numbers from 0x1000 on belong to the drives: the
+  controller forwards requests (0x640) and returns the answers (0x5C0).
+- A new value takes effect from the next sample until its node restarts; a restart restores the defaults. A run with an
+  external controller restarts it.
+- *Settable at rest*: for the controller ready, or enabled with no move planned or under way; for the drives, torque off.
+  Otherwise the answer is `not-now`, as it is to a set in the first frame that a node receives, which may be a replay, and
+  to requests for silent drives.
+- Corner frequencies are bounded by the sampling rate: beyond a quarter of a radian per sample, no phase margin is left
+  for the delays of sampling and bus.
+- `plant-sim parameters` sends with the operator's identifier and finds a valid value of the operator's counter by
+  itself; an operator that requests parameters at the same time may lose requests and has to repeat them.
 ",
     );
     for (server, title) in [

@@ -1,14 +1,14 @@
 //! Curves of any length in bounded memory.
 
-/// Bins of a series: as many as a curve has pixels to show them, or up to twice that.
+/// Bins of a series: as many as the pixels of a curve, or up to twice that.
 const BINS: usize = 2048;
 /// Width of a bin at the start, us.
 const FINEST_US: u64 = 250;
 
 /// Least and greatest value in each of a fixed number of equal spans of time.
 ///
-/// When time passes the last bin, neighbours are merged and every bin is twice as wide: a curve of any length ends
-/// with its bins at least half used, and keeps every peak.
+/// When time passes the last bin, neighbours are merged and bins become twice as wide: a curve of any length uses at
+/// least half of the bins, and keeps every peak.
 pub(super) struct Series {
     width_us: u64,
     bins: Vec<Option<Bin>>,

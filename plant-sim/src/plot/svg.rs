@@ -24,7 +24,7 @@ const COLOURS: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"];
 /// Style of dots.
 const DOT: &str = r##"stroke="#222" stroke-width="3.2" stroke-linecap="round""##;
 
-/// What a panel shows: curves in one unit.
+/// A panel: curves in one unit.
 struct Panel<'a> {
     title: &'static str,
     unit: &'static str,
@@ -37,7 +37,7 @@ struct Curve<'a> {
     series: &'a Series,
     name: &'static str,
     colour: &'static str,
-    /// Dots instead of a line: values that come too seldom to join them.
+    /// Dots instead of a line, for values too sparse to join.
     dots: bool,
 }
 
@@ -151,7 +151,7 @@ fn draw_panel(page: &mut Svg, panel: &Panel, top: f64, span: f64) {
     if low > high {
         (low, high) = (0.0, 0.0);
     }
-    // A flat curve gets an axis too.
+    // Even a flat curve gets an axis.
     let margin = ((high - low) * 0.06).max(1e-3).max(high.abs() * 1e-6);
     (low, high) = (low - margin, high + margin);
     let y = |value: f64| top + PANEL - (value - low) / (high - low) * PANEL;
@@ -195,7 +195,7 @@ fn legend(page: &mut Svg, panel: &Panel, top: f64) {
     }
 }
 
-/// A dot is a line of no length with round ends.
+/// Dots as lines of zero length with round ends.
 fn dots(series: &Series, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> String {
     let mut text = String::new();
     for (time, bin) in series.bins() {
@@ -205,7 +205,7 @@ fn dots(series: &Series, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> Stri
     text
 }
 
-/// The envelope as one line: of each bin the extreme that is nearer to the last point comes first.
+/// The envelope as one line: in each bin the extreme nearer to the last point comes first.
 fn points(series: &Series, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> String {
     let mut text = String::new();
     let mut last = None;
@@ -244,7 +244,7 @@ fn modes(page: &mut Svg, plot: &Plot, span: f64) {
         );
         let name = format!("{mode} from {:.3} s", *start as f64 / 1e6);
         page.named_rectangle([left, top, width, STRIP], &style, &name);
-        // A name that would not fit is left to the tooltip: letters of this size take 7 units.
+        // A name that does not fit is only in the tooltip: letters of this size take 7 units.
         if width > 7.0 * mode.name().len() as f64 {
             let style = r#"font-size="11" text-anchor="middle""#;
             page.text(left + width / 2.0, top + 14.0, style, mode.name());

@@ -1,7 +1,7 @@
 //! The emulator as a child process, and the channel to it.
 //!
-//! It ends with this process, however that ends: the channel is closed by then, and the board ends the emulation when it
-//! reads the end of it, or, on its UART, when nothing has come for 20 s. A thread watches over a child that does not get
+//! It ends with this process, however that ends: the channel is closed then, and the board ends the emulation when it
+//! reads the end of the channel, or on its UART, after 20 s of silence. A thread supervises a child that does not get
 //! that far.
 
 use std::fs::{self, File};
@@ -33,34 +33,34 @@ const ICOUNT_SHIFT: u32 = 10;
 /// Period of SysTick on the emulated board, ns: 25 MHz.
 const TICK_NS: u64 = 40;
 
-/// Instructions that this many SysTick counts stand for, while they are counted.
+/// Instructions in this many SysTick counts, while instructions are counted.
 pub(super) fn instructions(ticks: u32) -> u32 {
     (u64::from(ticks) * TICK_NS).div_ceil(1 << ICOUNT_SHIFT) as u32
 }
 
-/// Names of the socket that is the other end of UART 0, and of the file that UART 1 goes to.
+/// Names of the socket at the other end of UART 0, and of the file for UART 1.
 const UART: &str = "uart";
 const LOG: &str = "log";
 
 /// A running board.
 #[derive(Debug)]
 pub(super) struct Board {
-    /// What is sent to it at every start.
+    /// Setup record, sent at every start.
     setup: [u8; SETUP_LEN],
     /// `None` once the channel is closed.
     requests: Option<ChildStdin>,
     replies: BufReader<ChildStdout>,
-    /// What the frames travel on, unless it is the FIFOs.
+    /// The serial line for frames, unless they use the FIFOs.
     serial: Option<Serial<UnixStream>>,
-    /// What has been logged, as it came.
+    /// The raw log.
     log: File,
     watch: Arc<Watch>,
     watcher: Option<JoinHandle<Ended>>,
 }
 
 impl Board {
-    /// Starts the emulator; `count` makes its clock that of instructions. What the board sends as soon as its bus is open is
-    /// appended to `sent`.
+    /// Starts the emulator; with `count` its clock counts instructions. Frames that the board sends once its bus is
+    /// open are appended to `sent`.
     pub(super) fn start(
         image: &Path,
         setup: &Setup,
@@ -102,8 +102,8 @@ impl Board {
             Channel::Uart => {
                 let path = place.0.join(UART);
                 let socket = UnixListener::bind(&path).map_err(|error| unusable(&path, &error))?;
-                // The emulator moves bytes of a multiplexed device in larger pieces; -echr takes its escape character
-                // out of the range of bytes.
+                // The emulator moves bytes of a multiplexed device in larger pieces; -echr puts its escape character
+                // outside the range of bytes.
                 command
                     .args(["-chardev", &format!("socket,id=uart,path={UART},mux=on")])
                     .args(["-serial", "chardev:uart", "-echr", "0x100"]);
@@ -135,8 +135,8 @@ impl Board {
             watch,
             watcher: Some(watcher),
         };
-        // The emulator has opened all of its ends before the board says a word: the names may go when this function
-        // ends.
+        // The emulator has opened all of its ends before the board sends anything: the names may be removed when
+        // this function ends.
         board.set_up()?;
         if let Some(socket) = socket {
             let (line, _) = socket
@@ -148,8 +148,8 @@ impl Board {
         Ok(board)
     }
 
-    /// Follows a board that starts again, up to where it is ready; returns how it ended before. What it sends as soon as its
-    /// bus is open is appended to `sent`.
+    /// Follows a restarting board until it is ready; returns how it ended before. Frames that it sends once its bus is
+    /// open are appended to `sent`.
     pub(super) fn restart(&mut self, sent: &mut Vec<CanFrame>) -> Result<Stop, PeerError> {
         let stop = self.set_up()?;
         if self.serial.is_some() {
@@ -158,11 +158,11 @@ impl Board {
         Ok(stop)
     }
 
-    /// Takes the greeting, tells the board its setup, and waits until it is ready.
+    /// Takes the greeting, sends the board its setup, and waits until it is ready.
     fn set_up(&mut self) -> Result<Stop, PeerError> {
         let said = self.wait(|board| listen(&mut board.replies, &mut Vec::new()))?;
         let Said::Greeting(stop) = said else {
-            return Err(failure("did not start again when asked to"));
+            return Err(failure("did not restart when requested"));
         };
         let record = self.setup;
         self.say(&record)?;
@@ -170,7 +170,7 @@ impl Board {
         Ok(stop)
     }
 
-    /// Hands a frame over on the UART, and appends what comes back to `sent`.
+    /// Sends a frame over the UART and appends the answers to `sent`.
     pub(super) fn exchange(
         &mut self,
         frame: &CanFrame,
@@ -179,12 +179,12 @@ impl Board {
         self.serial(|serial| serial.exchange(frame, sent))
     }
 
-    /// Hands over a frame on the UART that resets the board: there is no answer.
+    /// Sends a frame over the UART that resets the board: there is no answer.
     pub(super) fn send(&mut self, frame: &CanFrame) -> Result<(), PeerError> {
         self.serial(|serial| serial.send(frame))
     }
 
-    /// Closes the bus on the UART; returns how many bytes the board's receiver has lost.
+    /// Closes the bus on the UART; returns the number of bytes that the board's receiver has lost.
     pub(super) fn close_bus(&mut self) -> Result<u32, PeerError> {
         self.serial(Serial::close)?;
         Ok(self.answer(&mut Vec::new())?.number)
@@ -200,7 +200,7 @@ impl Board {
         })
     }
 
-    /// Asks and waits for the answer: appends its frames to `sent` and returns what was measured.
+    /// Sends a request and waits for the answer: appends its frames to `sent` and returns the measurements.
     pub(super) fn ask(
         &mut self,
         request: &Request,
@@ -219,14 +219,14 @@ impl Board {
         match self.wait(|board| listen(&mut board.replies, sent))? {
             Said::Reply(measured) => Ok(measured),
             Said::Greeting(stop) => Err(failure(format!(
-                "has started again by itself: {} at {:#010x}, fault status {:#010x}; arm-none-eabi-addr2line -ife IMAGE \
+                "restarted by itself: {} at {:#010x}, fault status {:#010x}; arm-none-eabi-addr2line -ife IMAGE \
                  ADDRESS names the place",
                 stop.reason, stop.at, stop.status
             ))),
         }
     }
 
-    /// Waits for the board, under the eyes of the watching thread.
+    /// Waits for the board, supervised by the thread.
     fn wait<T>(&mut self, what: impl FnOnce(&mut Self) -> io::Result<T>) -> Result<T, PeerError> {
         self.watch.waiting.store(true, Ordering::Relaxed);
         let answer = what(self);
@@ -244,7 +244,7 @@ impl Board {
             .map_err(|error| self.ended(&error))
     }
 
-    /// Why there is no answer.
+    /// The reason for a missing answer.
     fn ended(&mut self, error: &io::Error) -> PeerError {
         if error.kind() == io::ErrorKind::InvalidData {
             return failure(format!("uses another protocol: {error}"));
@@ -263,7 +263,7 @@ impl Board {
         }
     }
 
-    /// Ends the emulation; returns what the board has logged, as it came.
+    /// Ends the emulation; returns the raw log.
     pub(super) fn take_log(&mut self) -> io::Result<Vec<u8>> {
         self.close();
         let mut log = Vec::new();
@@ -285,15 +285,15 @@ impl Drop for Board {
     }
 }
 
-/// What the board says on its FIFO.
+/// A record from the board's FIFO.
 enum Said {
-    /// An answer, with what was measured.
+    /// An answer, with its measurements.
     Reply(Measured),
-    /// That it has started, and how it ended before.
+    /// The greeting at its start: how it ended before.
     Greeting(Stop),
 }
 
-/// Reads what the board says next.
+/// Reads the next record from the board.
 fn listen(replies: &mut impl Read, sent: &mut Vec<CanFrame>) -> io::Result<Said> {
     let mut header = [0; REPLY_HEADER];
     replies.read_exact(&mut header)?;
@@ -302,7 +302,7 @@ fn listen(replies: &mut impl Read, sent: &mut Vec<CanFrame>) -> io::Result<Said>
         replies.read_exact(&mut rest)?;
         return greeted(&rest)
             .map(Said::Greeting)
-            .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, "no reason of its start"));
+            .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, "no reason for its start"));
     }
     let (count, measured) = reply_header(&header);
     for _ in 0..count {
@@ -346,7 +346,7 @@ mod tests {
 
     use super::*;
 
-    /// A board that has started again is noticed where an answer was due.
+    /// A restarted board is noticed in place of an answer.
     #[test]
     fn a_greeting_is_no_answer() {
         let stop = Stop::without_fault(ResetReason::Watchdog);

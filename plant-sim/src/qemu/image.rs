@@ -1,4 +1,4 @@
-//! Finds the image by building it: a build that has nothing to do takes a moment, and a stale image is never run.
+//! Finds the image by building it: an up-to-date build takes a moment, and a stale image is never run.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -8,10 +8,10 @@ use sim::peer::PeerError;
 
 const PACKAGE: &str = "mps2-an386";
 
-/// Builds an image of the board from the sources; returns where it is.
+/// Builds an image of the board from the sources; returns its path.
 ///
 /// # Errors
-/// It cannot be built; with what to do about it.
+/// It cannot be built; the error says what to do.
 pub fn build(program: &str) -> Result<PathBuf, PeerError> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/board/cargo");
     if !script.exists() {
@@ -29,7 +29,7 @@ pub fn build(program: &str) -> Result<PathBuf, PeerError> {
         .map_err(|error| failure(format!("cannot be built: {}: {error}", script.display())))?;
     if !output.status.success() {
         return Err(failure(format!(
-            "cannot be built: {} says why above",
+            "cannot be built; see the output of {} above",
             script.display()
         )));
     }
@@ -37,7 +37,7 @@ pub fn build(program: &str) -> Result<PathBuf, PeerError> {
         .ok_or_else(|| failure(format!("cannot be built: cargo names no program {program}")))
 }
 
-/// The program among cargo's messages, one JSON object a line.
+/// The program among cargo's messages, one JSON object per line.
 fn executable(messages: &[u8]) -> Option<PathBuf> {
     messages.split(|byte| *byte == b'\n').find_map(|line| {
         let message: serde_json::Value = serde_json::from_slice(line).ok()?;

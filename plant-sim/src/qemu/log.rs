@@ -1,10 +1,10 @@
-//! The board's log: defmt, which sends numbers of messages; their text is in the image.
+//! The board's log: defmt sends message numbers; the texts are in the image.
 
 use std::fmt::Write as _;
 
 use defmt_decoder::{DecodeError, Table};
 
-/// Every message as a line: time in s, level, text. What cannot be read is a line that says so.
+/// Every message as a line: time in s, level, text. An unreadable one becomes an error line.
 ///
 /// # Errors
 /// The image has no messages, or those of another version of defmt.
@@ -41,7 +41,7 @@ mod tests {
 
     use super::*;
 
-    /// One message with a number, and a time of milliseconds in front.
+    /// One message with a number, preceded by a time in milliseconds.
     fn table() -> Table {
         let entry = |tag, text| json!({"string": {"tag": tag, "string": text}, "raw_symbol": ""});
         let table = json!({
@@ -56,7 +56,7 @@ mod tests {
         serde_json::from_value(table).unwrap()
     }
 
-    /// Message 1 at 0x0102 ms with 9, by hand: the zeros are left out; the last byte before the end says where they were
+    /// Message 1 at 0x0102 ms with 9, by hand: the zeros are left out; the last byte before the end marks their places
     /// (rzCOBS, bit n for byte n of seven).
     const MESSAGE: [u8; 6] = [1, 2, 1, 9, 0b0011_0010, 0];
 
@@ -92,7 +92,7 @@ mod tests {
             lines(&table(), &log);
         }
 
-        /// A message whose number is right, and nothing else is.
+        /// A message with a valid number and nothing else valid.
         #[test]
         fn no_damage_is_a_panic(rest in proptest::collection::vec(any::<u8>(), 0..60)) {
             if let Ok((message, _)) = table().decode(&[&[2, 0][..], &rest[..]].concat()) {

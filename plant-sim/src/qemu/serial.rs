@@ -5,18 +5,18 @@ use std::io::{self, ErrorKind, Read, Write};
 use protocol::frame::CanFrame;
 use protocol::slcan::{Line, MAX_LINE, Parser, Text};
 
-/// A line to a board that acknowledges every line by an empty one, after what it has to say.
+/// A line to a board that acknowledges every line by an empty one, after its answers.
 #[derive(Debug)]
 pub(super) struct Serial<S> {
     stream: S,
     parser: Parser,
-    /// Bytes that came with the last reading, and how many of them are not yet looked at.
+    /// Bytes of the last read, and the number of those not yet processed.
     buffer: [u8; MAX_LINE],
     unread: std::ops::Range<usize>,
 }
 
 impl<S: Read + Write> Serial<S> {
-    /// A line at its beginning.
+    /// A line before its first use.
     pub(super) fn new(stream: S) -> Self {
         Self {
             stream,
@@ -26,9 +26,10 @@ impl<S: Read + Write> Serial<S> {
         }
     }
 
-    /// Opens the bus: 1 Mbit/s, data phase 5 Mbit/s. What the board sends then is appended to `sent`.
+    /// Opens the bus: 1 Mbit/s, data phase 5 Mbit/s. Frames that the board then sends are appended to
+    /// `sent`.
     pub(super) fn open(&mut self, sent: &mut Vec<CanFrame>) -> io::Result<()> {
-        // An empty line first: it ends whatever stood in the line before.
+        // An empty line first, to end an unfinished one.
         for line in [
             Line::Empty,
             Line::Bitrate(8),
@@ -41,7 +42,7 @@ impl<S: Read + Write> Serial<S> {
         Ok(())
     }
 
-    /// Hands a frame over and appends what the board sends before it acknowledges.
+    /// Sends a frame and appends the frames that the board sends before its acknowledgement.
     pub(super) fn exchange(
         &mut self,
         frame: &CanFrame,
@@ -51,7 +52,7 @@ impl<S: Read + Write> Serial<S> {
         self.answer(sent)
     }
 
-    /// Hands a frame over that has no answer.
+    /// Sends a frame that has no answer.
     pub(super) fn send(&mut self, frame: &CanFrame) -> io::Result<()> {
         self.say(Line::Frame(*frame))
     }
@@ -75,9 +76,9 @@ impl<S: Read + Write> Serial<S> {
                     sent.push(frame);
                     continue;
                 }
-                Some(Ok(Line::Refused)) => "the board has refused a line".to_string(),
-                Some(Ok(line)) => format!("no answer: {line:?}"),
-                Some(Err(error)) => format!("no slcan: {error}"),
+                Some(Ok(Line::Refused)) => "the board refused a line".to_string(),
+                Some(Ok(line)) => format!("not an answer: {line:?}"),
+                Some(Err(error)) => format!("not slcan: {error}"),
             };
             return Err(io::Error::new(ErrorKind::InvalidData, line));
         }
@@ -98,12 +99,12 @@ mod tests {
 
     use super::*;
 
-    /// What a board says, and what was sent to it.
+    /// Output of a board, and what was sent to it.
     struct Script(io::Cursor<Vec<u8>>, Vec<u8>);
 
     impl Read for Script {
         fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-            // One byte at a time: a line may come in any pieces.
+            // One byte at a time: a line may arrive in any pieces.
             self.0.read(&mut buffer[..1])
         }
     }
@@ -139,8 +140,8 @@ mod tests {
     fn whatever_is_no_answer_is_an_error() {
         for (answer, says) in [
             (&b"\x07"[..], "refused"),
-            (b"xyz\r", "no slcan"),
-            (b"V\r", "no answer"),
+            (b"xyz\r", "not slcan"),
+            (b"V\r", "not an answer"),
             (b"t3000\r", "end of file"),
         ] {
             let error = ask(answer).0.unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! The thread that watches over the emulator.
+//! The thread that supervises the emulator.
 
 use std::io::{self, Read};
 use std::process::{Child, ExitStatus};
@@ -6,14 +6,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-/// How often the child is looked at.
+/// Interval of checking on the child.
 const LOOK: Duration = Duration::from_millis(20);
-/// Looks without an answer after which the board counts as hung: 20 s. An answer takes microseconds.
+/// Checks without an answer after which the board counts as hung: 20 s. An answer takes microseconds.
 const PATIENCE: u32 = 1000;
-/// Looks that a child has to end by itself once the channel is closed: 2 s.
+/// Checks for which a child may end by itself once the channel is closed: 2 s.
 const FAREWELL: u32 = 100;
 
-/// What the watching thread has to know.
+/// State shared with the supervising thread.
 #[derive(Debug, Default)]
 pub(super) struct Watch {
     pub(super) waiting: AtomicBool,
@@ -28,7 +28,7 @@ pub(super) enum Ended {
     Hung,
 }
 
-/// Waits for the child to end, and sees to it that it does.
+/// Waits for the child to end, and makes sure that it does.
 pub(super) fn supervise(mut child: Child, watch: &Watch) -> Ended {
     let mut seen = (0, 0);
     let mut farewell = 0;
@@ -47,7 +47,7 @@ pub(super) fn supervise(mut child: Child, watch: &Watch) -> Ended {
         };
         farewell += u32::from(watch.closing.load(Ordering::Relaxed));
         if seen.1 > PATIENCE || farewell > FAREWELL {
-            // SIGKILL: a blocked emulator does not listen to less.
+            // SIGKILL: a blocked emulator ignores anything less.
             let _ = child.kill();
             let _ = child.wait();
             break Ended::Hung;
@@ -56,7 +56,7 @@ pub(super) fn supervise(mut child: Child, watch: &Watch) -> Ended {
     }
 }
 
-/// What a child that has ended has written to standard error.
+/// Standard error of a child that has ended.
 fn said(child: &mut Child) -> String {
     let mut text = String::new();
     if let Some(stderr) = &mut child.stderr {

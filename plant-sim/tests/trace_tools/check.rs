@@ -1,4 +1,4 @@
-//! What `trace check` finds.
+//! Violations that `trace check` finds.
 
 use super::*;
 
@@ -33,7 +33,7 @@ fn every_rule_is_told_where_it_is_broken() {
             },
         ),
         (
-            // The command that answers the lost feedback is the first to tell.
+            // The command that answers the lost feedback is the first evidence.
             without(8),
             8,
             Offence::Echo {

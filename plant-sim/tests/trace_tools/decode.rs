@@ -1,4 +1,4 @@
-//! What `trace decode` writes.
+//! Output of `trace decode`.
 
 use super::*;
 

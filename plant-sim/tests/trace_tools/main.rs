@@ -1,4 +1,4 @@
-//! The trace tools against traces whose content is known: made here frame by frame, or by a run.
+//! The trace tools against traces of known content: made here frame by frame, or by a run.
 
 mod check;
 mod decode;

@@ -1,8 +1,8 @@
-//! Traces of a run: judged, repeated and drawn.
+//! Traces of a run: checked, replayed and plotted.
 
 use super::*;
 
-/// One cycle of the gate motion, and what the rig said of it.
+/// One cycle of the gate motion, and its summary.
 static RUN: LazyLock<(Vec<Record>, Summary)> = LazyLock::new(|| {
     let mut scenario = Scenario::built_in("gate").unwrap();
     scenario.cycles = 1;

@@ -1,4 +1,4 @@
-//! What `trace stats` counts.
+//! Counts of `trace stats`.
 
 use super::*;
 
@@ -42,7 +42,7 @@ fn statistics_are_those_of_the_definition() {
     );
 }
 
-/// Bits on the wire over time, as the bus itself reckons.
+/// Bits on the wire over time, as computed by the bus itself.
 #[test]
 fn load_is_the_time_of_the_frames() {
     let records = good();

@@ -1,21 +1,21 @@
-//! The simulation as WebAssembly: the text of a request in, the texts of a run's results out.
+//! The simulation as WebAssembly: a request as text in, the results of a run as text out.
 //!
-//! A module that imports nothing and exports its memory and four functions. The other side writes a [`Request`] as JSON,
-//! in UTF-8, into the memory and reads the results there:
+//! A module that imports nothing and exports its memory and four functions. The host writes a [`Request`] as UTF-8 JSON
+//! into the memory and reads the results there:
 //!
 //! ```js
 //! const { memory, input, run, output, output_len } = instance.exports;
 //! const request = new TextEncoder().encode(JSON.stringify({ scenario, law: "pid", rate_hz: 500 }));
 //! const place = input(request.length);
-//! // After each call anew: memory that grows gets another buffer.
+//! // Anew after each call: memory that grows gets another buffer.
 //! new Uint8Array(memory.buffer, place, request.length).set(request);
 //! const status = run();
 //! const text = (which) => new TextDecoder().decode(new Uint8Array(memory.buffer, output(which), output_len(which)));
 //! const trace = text(0), truth = text(1), summary = text(2), error = text(3);
 //! ```
 //!
-//! The trace is the `trace.log`, the truth the `truth.csv` that `plant-sim run` writes, to the byte. The memory that a run
-//! takes is given back by the next one.
+//! The trace equals the `trace.log`, the truth the `truth.csv` of `plant-sim run`, to the byte. The memory of a run is
+//! freed by the next one.
 
 use std::cell::RefCell;
 
@@ -26,28 +26,28 @@ use sim::scenario::{MAX_CYCLES, Scenario, check_rate};
 use sim::selection::LawChoice;
 use sim::setup::RunConfig;
 
-/// What is to run.
+/// A requested run.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Request {
     /// Text of a scenario file.
     scenario: String,
-    /// Instead of the scenario's: control law, such as `computed-torque:observer`.
+    /// Overrides the scenario: control law, such as `computed-torque:observer`.
     law: Option<LawChoice>,
-    /// Instead of the scenario's: control rate, Hz.
+    /// Overrides the scenario: control rate, Hz.
     rate_hz: Option<f64>,
-    /// Instead of the scenario's: how often the cycle is repeated.
+    /// Overrides the scenario: number of cycles.
     cycles: Option<u32>,
 }
 
-/// What has run.
+/// Results of a run.
 struct Results {
     trace: Vec<u8>,
     truth: Vec<u8>,
     summary: Vec<u8>,
 }
 
-/// Runs what a request asks for. A scenario that could not be completed has results, too; its summary says why.
+/// Executes a request. A scenario that could not be completed also has results; its summary says why.
 fn answer(request: &[u8]) -> Result<Results, String> {
     let request: Request =
         serde_json::from_slice(request).map_err(|error| format!("request: {error}"))?;
@@ -87,7 +87,7 @@ thread_local! {
     static OUTPUT: RefCell<[Vec<u8>; 4]> = const { RefCell::new([const { Vec::new() }; 4]) };
 }
 
-/// Makes room for a request of `len` bytes and returns where it is to be written.
+/// Makes room for a request of `len` bytes and returns the address to write it to.
 // SAFETY: the exported names are unique in the module; nothing else is unsafe about this function, nor about those below.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(len: usize) -> *mut u8 {
@@ -97,10 +97,10 @@ pub extern "C" fn input(len: usize) -> *mut u8 {
     })
 }
 
-/// Runs the request in the input: 0 when there are results, 1 when there is an error instead.
+/// Runs the request in the input: 0 with results, 1 with an error instead.
 #[unsafe(no_mangle)]
 pub extern "C" fn run() -> u32 {
-    // First, so that the memory of the last run can hold those of this one.
+    // First, so that the memory of the last run can be reused for this one.
     OUTPUT.set(Default::default());
     let request = INPUT.take();
     match answer(&request) {
@@ -119,7 +119,7 @@ pub extern "C" fn run() -> u32 {
     }
 }
 
-/// Where a result is: 0 trace, 1 truth, 2 summary (JSON), 3 error. It stays until the next run.
+/// Where a result is: 0 trace, 1 truth, 2 summary (JSON), 3 error. Valid until the next run.
 #[unsafe(no_mangle)]
 pub extern "C" fn output(which: usize) -> *const u8 {
     OUTPUT.with_borrow(|output| output.get(which).map_or(std::ptr::null(), Vec::as_ptr))

@@ -1,4 +1,4 @@
-//! Ends of a CAN bus on a Linux host: SocketCAN and serial-line adapters (slcan).
+//! Access to a CAN bus on a Linux host: SocketCAN and serial-line adapters (slcan).
 //!
 //! # Contents
 //!

@@ -22,7 +22,7 @@ const CLIENTS: usize = 16;
 /// Bytes that may wait for a client. One that does not read loses frames, as on a real bus, without affecting the
 /// others.
 const QUEUE: usize = 4096 * MAX_LINE;
-/// Frames that may wait for this node, give or take one buffer per client; with more, no client is read.
+/// Frames that may wait for this node, plus at most one buffer per client; with more, no client is read.
 const RECEIVED: usize = 4096;
 /// Hardware and software version reported to clients.
 const VERSION: Line = Line::VersionIs([0x10, 0x10]);

@@ -1,4 +1,4 @@
-//! The summary of a run as a person reads it.
+//! The summary of a run as text.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,7 +15,7 @@ macro_rules! line {
     }};
 }
 
-/// The summary as a person reads it; the files are in `out`.
+/// The summary as text; the files are in `out`.
 pub(super) fn report(results: &Results, config: &RunConfig, out: &Path) -> String {
     let summary = &results.summary;
     let mut text = String::new();
@@ -69,27 +69,27 @@ fn cycles(summary: &Summary) -> String {
     }
 }
 
-/// What the controller is wrong about.
+/// Mismatch between the controller's model and the robot.
 fn difference(config: &RunConfig, text: &mut String) {
     let mismatch = &config.scenario.mismatch;
     let mut wrong = Vec::new();
     if config.nominal.name != config.actual.name {
         wrong.push(format!(
-            "the controller is made for {}",
+            "the controller is configured for {}",
             config.nominal.name
         ));
     } else if config.nominal != config.actual {
-        wrong.push("the controller's model of it has other numbers".into());
+        wrong.push("the controller's model has other numbers".into());
     }
     if mismatch.friction != 1.0 {
         wrong.push(format!(
-            "true friction is {} times what it believes",
+            "actual friction is {} times nominal",
             mismatch.friction
         ));
     }
     if mismatch.payload != 1.0 {
         wrong.push(format!(
-            "true payload is {} times what it believes",
+            "actual payload is {} times nominal",
             mismatch.payload
         ));
     }
@@ -159,7 +159,7 @@ fn no_time(summary: &Summary) -> &'static str {
     }
 }
 
-/// What the axes had to give.
+/// Load of the axes.
 fn load(summary: &Summary, text: &mut String) {
     let row = |name: &str, values: [String; 4]| {
         let [shoulder, elbow, lift, wrist] = values;
@@ -177,7 +177,7 @@ fn load(summary: &Summary, text: &mut String) {
     );
 }
 
-/// How it ended.
+/// End of the run.
 fn end(summary: &Summary, text: &mut String) {
     if summary.faults.is_empty() {
         line!(text, "  faults            none");
@@ -194,7 +194,7 @@ fn end(summary: &Summary, text: &mut String) {
     }
     if !summary.completed {
         let rest = if summary.at_rest {
-            "at rest behind its brake"
+            "at rest, brake closed"
         } else {
             "not at rest"
         };

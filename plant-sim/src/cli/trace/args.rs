@@ -10,10 +10,10 @@ use trace::Interface;
 use trace::convert::Target;
 use trace::select::{Ids, Moment, Selection};
 
-/// A trace, and which of its records count.
+/// A trace, and a selection of its records.
 #[derive(Args)]
 pub(crate) struct InputArgs {
-    /// candump log, candump's screen output, Vector ASC or pcapng, also with gzip; - for standard input.
+    /// candump log, candump's screen output, Vector ASC or pcapng, optionally gzipped; - for standard input.
     pub file: PathBuf,
     /// Only these identifiers: hexadecimal, 3 digits (11 bits) or 8 (29 bits), a range (300-3FF) or a message's name.
     #[arg(long, value_name = "ID", value_delimiter = ',')]
@@ -21,7 +21,7 @@ pub(crate) struct InputArgs {
     /// Only these interfaces.
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = interface)]
     interface: Vec<Interface>,
-    /// Only from this time on: seconds as the trace has them, or after its first record (+12.5).
+    /// Only from this time on: seconds as in the trace, or after its first record (+12.5).
     #[arg(long, value_name = "S")]
     from: Option<Moment>,
 }
@@ -37,10 +37,10 @@ impl InputArgs {
     }
 }
 
-/// The end of what counts; apart from [`InputArgs`], since `convert` calls its format so, too.
+/// End of the selection; separate from [`InputArgs`], since `convert` uses the same option for its format.
 #[derive(Args)]
 pub(crate) struct EndArgs {
-    /// Only up to this time: seconds as the trace has them, or after its first record (+12.5).
+    /// Only up to this time: seconds as in the trace, or after its first record (+12.5).
     #[arg(long, value_name = "S")]
     pub to: Option<Moment>,
 }
@@ -77,7 +77,7 @@ pub(super) fn bit_timing(text: &str) -> Result<BitTiming, String> {
     }
 }
 
-/// Seconds that are skipped or waited for.
+/// Seconds to skip or to wait.
 fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: Option<f64> = text.parse().ok();
     seconds
@@ -93,7 +93,7 @@ pub(crate) struct DecodeArgs {
     pub input: InputArgs,
     #[command(flatten)]
     pub end: EndArgs,
-    /// How it is written.
+    /// Output format.
     #[arg(long, value_name = "FORMAT", default_value = "text")]
     pub format: FormatChoice,
     /// Write to this file instead of standard output.
@@ -103,11 +103,11 @@ pub(crate) struct DecodeArgs {
 
 #[derive(Clone, Copy, ValueEnum)]
 pub(crate) enum FormatChoice {
-    /// A line for each frame.
+    /// A line per frame.
     Text,
-    /// A row for each field.
+    /// A row per field.
     Csv,
-    /// An object for each frame.
+    /// An object per frame.
     Jsonl,
 }
 
@@ -118,13 +118,13 @@ pub(crate) struct StatsArgs {
     pub input: InputArgs,
     #[command(flatten)]
     pub end: EndArgs,
-    /// Bit rates of the bus, bit/s, for its load: nominal, and after a comma that of the data phase (500k,2M).
+    /// Bit rates of the bus, bit/s, for its load: nominal, and after a comma the data bit rate (500k,2M).
     #[arg(long, value_name = "N[,D]", default_value = "1M,5M", value_parser = bit_timing)]
     pub bitrate: BitTiming,
-    /// Leave out times without any record that are longer than this, as when a clock was set.
+    /// Leave out gaps without records longer than this, as when a clock was set.
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub skip_gaps: Option<Duration>,
-    /// Draw how the periods of each identifier are distributed.
+    /// Draw the distribution of the periods of each identifier.
     #[arg(long, conflicts_with = "json")]
     pub histogram: bool,
     /// Print JSON instead of a table.
@@ -150,7 +150,7 @@ pub(crate) struct PlotArgs {
 /// Arguments of `check`.
 #[derive(Args)]
 pub(crate) struct CheckArgs {
-    /// The whole trace is followed; offences of what is not selected are passed over.
+    /// The whole trace is followed; violations outside the selection are ignored.
     #[command(flatten)]
     pub input: InputArgs,
     #[command(flatten)]
@@ -163,13 +163,13 @@ pub(crate) struct CheckArgs {
 /// Arguments of `replay`.
 #[derive(Args)]
 pub(crate) struct ReplayArgs {
-    /// For the controller the trace must begin before its first sample; it gets all of it, and what is selected is
+    /// For the controller the trace must begin before its first sample; it receives all of it, and the selection is
     /// compared.
     #[command(flatten)]
     pub input: InputArgs,
     #[command(flatten)]
     pub end: EndArgs,
-    /// The robot that the recorded controller believed in (a model file).
+    /// The robot as the recorded controller knew it (a model file).
     #[arg(long, value_name = "FILE", conflicts_with = "bus")]
     pub model: Option<PathBuf>,
     /// Control rate of the recorded controller.
@@ -180,22 +180,22 @@ pub(crate) struct ReplayArgs {
         conflicts_with = "bus"
     )]
     pub rate: f64,
-    /// Bit rates of the recorded bus, bit/s, from which the controller knows when its commands act (1M,5M).
+    /// Bit rates of the recorded bus, bit/s, which determine when the controller's commands act (1M,5M).
     #[arg(long, value_name = "N[,D]", default_value = "1M,5M", value_parser = bit_timing, conflicts_with = "bus")]
     pub bitrate: BitTiming,
     /// Play every frame onto this bus instead: socketcan:INTERFACE, slcan:TERMINAL, slcan:tcp:HOST:PORT or
     /// slcan:listen:HOST:PORT.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<LinkAddress>,
-    /// How many times as fast as recorded; 0: as fast as the bus takes the frames.
+    /// Speed relative to the recording; 0: as fast as the bus takes the frames.
     #[arg(long, value_name = "X", default_value_t = 1.0, requires = "bus", allow_negative_numbers = true, value_parser = speed)]
     pub speed: f64,
-    /// Do not wait through recorded times without any record that are longer than this.
+    /// Skip recorded gaps without records longer than this.
     #[arg(long, value_name = "S", requires = "bus", value_parser = seconds)]
     pub skip_gaps: Option<Duration>,
 }
 
-/// A speed at which every time of a trace stays a time.
+/// A speed at which every time of a trace stays representable.
 fn speed(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(speed) if speed == 0.0 || (0.001..=1000.0).contains(&speed) => Ok(speed),
@@ -208,7 +208,7 @@ fn speed(text: &str) -> Result<f64, String> {
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     pub input: InputArgs,
-    /// What it becomes: pcapng (Wireshark, tshark), asc (CANalyzer, CANoe) or candump (can-utils, python-can); and, as a
+    /// Target format: pcapng (Wireshark, tshark), asc (CANalyzer, CANoe) or candump (can-utils, python-can); and, as a
     /// number, only up to this time.
     #[arg(long, value_name = "FORMAT|S", required = true, value_parser = goal)]
     to: Vec<Goal>,
@@ -217,7 +217,7 @@ pub(crate) struct ConvertArgs {
     pub out: Option<PathBuf>,
 }
 
-/// What `convert --to` says.
+/// A value of `convert --to`.
 #[derive(Clone, Copy)]
 enum Goal {
     Format(Target),
@@ -230,7 +230,7 @@ fn goal(text: &str) -> Result<Goal, String> {
         "asc" => Ok(Goal::Format(Target::Asc)),
         "candump" => Ok(Goal::Format(Target::Candump)),
         _ => text.parse().map(Goal::End).map_err(|error| {
-            format!("allowed: a format (pcapng, asc, candump) or a time; of a time: {error}")
+            format!("allowed: a format (pcapng, asc, candump) or a time; for a time: {error}")
         }),
     }
 }
@@ -248,8 +248,8 @@ impl ConvertArgs {
         match (formats.as_slice(), ends.as_slice()) {
             ([target], []) => Ok((*target, None)),
             ([target], [end]) => Ok((*target, Some(*end))),
-            ([], _) => Err("--to says no format; allowed: pcapng, asc, candump".into()),
-            _ => Err("--to says more than one format or one time".into()),
+            ([], _) => Err("--to has no format; allowed: pcapng, asc, candump".into()),
+            _ => Err("--to has more than one format or more than one time".into()),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! `trace check` and `trace replay`: traces held against the rules, a controller or a bus.
+//! `trace check` and `trace replay`: traces checked against the rules, compared with a controller, or played onto a
+//! bus.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -21,13 +22,13 @@ use crate::cli::run::load;
 use crate::cli::show;
 use crate::cli::signal::end_on_signal;
 
-/// A wait of the player that is worth a word.
+/// A wait of the player worth mentioning.
 const LONG: Duration = Duration::from_secs(1);
 
 /// Every interface is a bus of its own.
 type PerInterface<T> = BTreeMap<Interface, T>;
 
-/// Where an offence is: file and line, and the interface if there are several.
+/// Place of a violation: file and line, and the interface if there are several.
 fn place<T>(source: &Source, interface: Interface, all: &PerInterface<T>) -> String {
     if all.len() > 1 {
         format!("{}: {interface}", source.place())
@@ -126,7 +127,7 @@ fn play(args: &ReplayArgs, bus: &LinkAddress) -> Result<ExitCode, String> {
             interfaces.push(record.interface);
             if let [first, second] = interfaces.as_slice() {
                 eprintln!(
-                    "plant-sim: frames of {first} and {second} go onto one bus; --interface chooses"
+                    "plant-sim: frames of {first} and {second} go onto one bus; select one with --interface"
                 );
             }
         }
@@ -145,7 +146,7 @@ fn play(args: &ReplayArgs, bus: &LinkAddress) -> Result<ExitCode, String> {
     let played = player.finish().map_err(failed)?;
     let verdict = source.verdict()?;
     show(&format!(
-        "{} frames played onto {bus} in {:.3} s; {} had to wait for a place in the queue, {} error frames left out\n",
+        "{} frames played onto {bus} in {:.3} s; {} had to wait for room in the queue, {} error frames left out\n",
         played.frames,
         begun.elapsed().as_secs_f64(),
         played.waited,

@@ -1,4 +1,4 @@
-//! Where the result of a subcommand goes.
+//! Output of a subcommand.
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -10,14 +10,14 @@ use trace::Record;
 
 use super::source::{Source, input};
 
-/// Writes every record that counts, as they come.
+/// Writes every selected record as it arrives.
 pub(super) trait Records {
     fn record(&mut self, record: &Record) -> io::Result<()>;
     fn flush(&mut self) -> io::Result<()>;
 }
 
-/// Hands every record on; when the input has nothing more to give at once, so that a person at the end of a pipe sees
-/// what there is.
+/// Passes every record on, and flushes whenever the input is drained, so that the reader of a pipe sees everything so
+/// far.
 pub(super) fn each(source: &mut Source, sink: &mut impl Records) -> io::Result<()> {
     while let Some(record) = source.record() {
         sink.record(&record)?;
@@ -48,8 +48,8 @@ pub(super) fn refuse_same(file: &Path, out: Option<&Path>) -> Result<(), String>
     Ok(())
 }
 
-/// Does the writing, to the file or to standard output. A reader of standard output that has seen enough and gone
-/// (`| head`) is no error.
+/// Writes to the file or to standard output. A reader of standard output that has closed the pipe (`| head`) is not an
+/// error.
 pub(super) fn written(
     out: Option<&Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -61,7 +61,7 @@ pub(super) fn written(
                 Err(format!("cannot write to standard output: {error}"))
             }
             _ => {
-                // What a reader that has gone left in the buffer goes nowhere.
+                // What is left in the buffer has no reader any more.
                 let _ = sink.into_parts();
                 Ok(())
             }

@@ -1,4 +1,4 @@
-//! A trace as input: file or standard input, with progress and with bad lines named.
+//! A trace as input: file or standard input, with progress, and bad lines reported.
 
 use std::cell::Cell;
 use std::fs::File;
@@ -18,16 +18,16 @@ use crate::cli::signal;
 
 /// Unreadable lines that are shown; of more, only the number is.
 const SHOWN: u64 = 10;
-/// Records between two looks at the clock.
+/// Records between two checks of the clock.
 const LOOK: u64 = 1 << 14;
-/// Between two looks for a signal while there is nothing to read.
+/// Interval of checking for a signal while there is nothing to read.
 const WATCH: Timespec = Timespec {
     tv_sec: 0,
     tv_nsec: 100_000_000,
 };
-/// What gzip begins with.
+/// First bytes of gzip.
 const GZIP: &[u8] = b"\x1F\x8B";
-/// Exit code where there was nothing to judge: neither good (0) nor bad (1).
+/// Exit code if there was nothing to judge: neither good (0) nor bad (1).
 const NOTHING_JUDGED: u8 = 3;
 
 /// A trace that is read from front to end, with its progress on standard error.
@@ -35,7 +35,7 @@ pub(super) struct Source {
     name: String,
     reader: Reader<BufReader<Box<dyn Read>>>,
     selection: Selection,
-    /// Bytes read, and bytes there are if that is known.
+    /// Bytes read, and the total if known.
     bytes: Rc<Cell<u64>>,
     size: Option<u64>,
     first_us: Option<u64>,
@@ -117,7 +117,7 @@ impl Source {
         })
     }
 
-    /// The next line of an interface that counts; `None` at the end.
+    /// The next line of a selected interface; `None` at the end.
     pub(super) fn line(&mut self) -> Option<Result<Record, Problem>> {
         loop {
             self.progress();
@@ -146,7 +146,7 @@ impl Source {
         }
     }
 
-    /// The next record of an interface that counts; lines that cannot be read are named on standard error and left out.
+    /// The next record of a selected interface; unreadable lines are reported on standard error and skipped.
     pub(super) fn record_of_interface(&mut self) -> Option<Record> {
         loop {
             match self.line()? {
@@ -161,7 +161,7 @@ impl Source {
         }
     }
 
-    /// The next record that counts in every respect.
+    /// The next selected record.
     pub(super) fn record(&mut self) -> Option<Record> {
         loop {
             let record = self.record_of_interface()?;
@@ -171,7 +171,7 @@ impl Source {
         }
     }
 
-    /// Whether the record has an identifier and a time that count.
+    /// Whether the record's identifier and time are selected.
     pub(super) fn counts(&self, record: &Record) -> bool {
         let first_us = self.first_us.unwrap_or(record.time_us);
         self.selection.id(record) && self.selection.time(record, first_us)
@@ -187,7 +187,7 @@ impl Source {
         format!("{}:{}", self.name, self.reader.line())
     }
 
-    /// Success only if there was something and every line could be read.
+    /// Success only if the trace was not empty and every line could be read.
     pub(super) fn verdict(&self) -> Result<ExitCode, String> {
         if let Some(failure) = &self.failure {
             return Err(failure.clone());
@@ -202,7 +202,7 @@ impl Source {
         }
     }
 
-    /// Says that nothing was judged, and why: what is selected is not there, or `what`.
+    /// Reports that nothing was judged, and why: the selection is empty, or `what`.
     pub(super) fn nothing(&self, what: &str) -> ExitCode {
         let name = &self.name;
         match (self.selected, self.records) {
@@ -228,7 +228,7 @@ impl Source {
     }
 }
 
-/// The file, or standard input for `-`: without a buffer of its own, so that it can be waited for.
+/// The file, or standard input for `-`: unbuffered, so that it can be waited for.
 pub(super) fn input(path: &Path) -> io::Result<File> {
     if path == Path::new("-") {
         io::stdin().as_fd().try_clone_to_owned().map(File::from)
