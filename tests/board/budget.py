@@ -1,11 +1,11 @@
-"""Memory and instructions of the images for the emulated Cortex-M4F, held against goals and against the last figures.
+"""Memory and instructions of the images for the emulated Cortex-M4F, compared with goals and with the recorded figures.
 
     tests/board/budget.py FOLDER PLANT_SIM            print the table; exit 1 if a goal or a figure is missed
-    tests/board/budget.py FOLDER PLANT_SIM --update   print it and keep the figures
+    tests/board/budget.py FOLDER PLANT_SIM --update   print it and record the figures
 
-FOLDER is where cargo has put the images. The figures are in budget.csv beside this file. A figure may move by TOLERANCE (or
-SLACK) either way, since compilers of other versions make other code; a change of the sources that moves it further is to be
-seen in its commit. A goal is a limit.
+FOLDER is where cargo has put the images. The figures are in budget.csv next to this file. A figure may change by
+TOLERANCE (or SLACK) either way, since other compiler versions generate other code; a change of the sources that moves it
+further must update it in its commit. A goal is a limit.
 """
 
 import csv
@@ -15,7 +15,7 @@ import subprocess
 import sys
 
 TOLERANCE = 0.10
-# Small figures may move by this much: a few instructions are a large part of them.
+# Small figures may change by this much: a few instructions are a large part of them.
 SLACK = 16
 HERE = pathlib.Path(__file__).parent
 FIGURES = HERE / "budget.csv"
@@ -38,7 +38,7 @@ def sizes(image):
 
 
 def measure(folder, plant_sim):
-    """Name and value of every figure: bytes, and instructions a call or phase."""
+    """Name and value of every figure: bytes, and instructions per call or phase."""
     image, cost_image = folder / "mps2-an386", folder / "mps2-an386-cost"
     flash, static = sizes(image)
     bound = int(run(sys.executable, HERE / "stack.py", image).split()[0])
@@ -67,7 +67,7 @@ def main():
         if moved > max(SLACK, TOLERANCE * kept.get(name, value)) or goal and value > goal:
             missed.append(name)
     if missed:
-        sys.exit(f"budget.py: too far from the kept figure, or over the goal: {', '.join(missed)}")
+        sys.exit(f"budget.py: too far from the recorded figure, or over the goal: {', '.join(missed)}")
 
 
 main()

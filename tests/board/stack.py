@@ -1,9 +1,9 @@
-"""Bound of the stack of an image, from its machine code: what each function takes, along the deepest chain of calls.
+"""Bound of the stack of an image, from its machine code: frame sizes along the deepest chain of calls.
 
     tests/board/stack.py IMAGE [ROOT]
 
-Sound while every call is direct and no function calls itself; both are checked. One interrupt comes on top: all have
-the same priority, so none interrupts another. Faults do not return, and what they would overwrite is of no use any more.
+Sound while every call is direct and no function calls itself; both are checked. One interrupt is added: all have
+the same priority, so none interrupts another. Faults do not return, and what they overwrite is no longer needed.
 """
 
 import re

@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# What lib.bash promises of every check: a failure says where and why, and an apt at work elsewhere is waited for.
+# The guarantees of lib.bash for every check: a failure is reported with place and cause, and it waits for another apt.
 source "$(dirname "$0")/lib.bash"
 
-# planted TEXT...: the check on standard input fails, and each of the texts is in what it says.
+# planted TEXT...: the check on standard input fails, and its output has each of the texts.
 planted() {
     local text
     { echo "source $PWD/tests/ci/lib.bash" && cat; } >"$work/planted.sh"
     if bash "$work/planted.sh" >"$work/planted.out" 2>"$work/planted.err"; then
-        fail "passed, and was to fail: $(<"$work/planted.sh")"
+        fail "passed, but should have failed: $(<"$work/planted.sh")"
     fi
     for text; do
-        grep -qF -- "$text" "$work/planted.err" || fail "no \"$text\" in what a failed check says"
+        grep -qF -- "$text" "$work/planted.err" || fail "no \"$text\" in the output of a failed check"
     done
-    [ "$(grep -c '^FAIL' "$work/planted.err")" = 1 ] || fail "a failure is to be reported once"
+    [ "$(grep -c '^FAIL' "$work/planted.err")" = 1 ] || fail "a failure must be reported once"
     rm "$work/planted.err"
 }
 
@@ -28,11 +28,11 @@ END
 planted 'out of time' <<<'timeout 0.1 sleep 5'
 planted 'no such command' <<<'there-is-no-such-command'
 planted 'FAIL: too little' <<<'few=$(fail "too little")'
-planted 'was to be refused: true' <<<'refused text true'
+planted 'should have been refused: true' <<<'refused text true'
 planted 'no "that reason"' 'this reason' <<<'refused "that reason" bash -c "echo this reason >&2; false"'
-# The shell has a word of that name; a program is what is missing.
+# The shell has a keyword of that name; what is missing is the program.
 planted 'apt-get install some-package' <<<'id() { echo 1000; }; need select some-package'
-echo "ok: a check that fails says which command, where, and what it wrote"
+echo "ok: a failed check reports the command, its place and its output"
 
 mkdir "$work/stub"
 printf '#!/bin/sh\necho some complaint >&2\nexit 1\n' >"$work/stub/cargo"
@@ -40,10 +40,10 @@ chmod +x "$work/stub/cargo"
 refused 'some complaint' env "PATH=$work/stub:$PATH" tests/run format
 grep -q 'FAILED in format' "$work/refused.out"
 refused 'is not a step' tests/run nonsense
-echo "ok: the test command names the step that fails"
+echo "ok: the test command names the failed step"
 
 if [ "$(id -u)" != 0 ] || ! type -P apt-get perl >/dev/null; then
-    echo "- not tried, for want of root on Debian: waiting for another apt"
+    echo "- not tested without root on Debian: waiting for another apt"
     exit
 fi
 no_sources=(-o Dir::Etc::SourceList=/dev/null -o Dir::Etc::SourceParts=/dev/null -o APT::Get::List-Cleanup=0)
@@ -57,11 +57,11 @@ waits_for() {
         fcntl $file, F_SETLKW, $lock or die; open my $held, ">", $ARGV[1] or die; sleep 4' "$lock" "$work/held" &
     eventually "the lock" test -e "$work/held"
     apt_get "$@" >"$work/waited.err"
-    grep -q "waiting for another apt: Could not get lock $lock" "$work/waited.err" || fail "no word of $lock"
-    [ $((SECONDS - before)) -ge 3 ] || fail "$lock was not waited for"
+    grep -q "waiting for another apt: Could not get lock $lock" "$work/waited.err" || fail "no mention of $lock"
+    [ $((SECONDS - before)) -ge 3 ] || fail "did not wait for $lock"
     wait
 }
 waits_for /var/lib/apt/lists/lock "${no_sources[@]}" update
 waits_for /var/lib/dpkg/lock-frontend check
 waits_for /var/cache/apt/archives/lock autoclean
-echo "ok: another apt at work is waited for, by each of its three locks"
+echo "ok: waits for another apt, for each of its three locks"

@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
-# The loop over a real CAN interface: plant and controller as two processes on vcan0, in lock-step and in real time, with
-# the tools that CAN people use beside them. Where this kernel has no vcan, everything runs in User-Mode Linux.
-#
-# Nothing here depends on how fast the machine is: what is held are counts, bytes, exit statuses and messages.
+# The loop over a real CAN interface: plant and controller as two processes on vcan0, in lock-step and in real time,
+# with the usual CAN tools alongside. If this kernel has no vcan, everything runs in User-Mode Linux.
+# Nothing here depends on the speed of the machine: the checks are of counts, bytes, exit statuses and messages.
 source "$(dirname "$0")/lib.bash"
 need_vcan
 build_host

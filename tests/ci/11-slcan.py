@@ -1,5 +1,5 @@
-"""11-slcan.py PORT TRACE PID: watches the bus on PORT with python-can until process PID has ended, then holds what it
-saw against the trace: every frame, with identifier, data and FD flags."""
+"""11-slcan.py PORT TRACE PID: watches the bus on PORT with python-can until process PID has ended, then compares what it
+saw with the trace: every frame, with identifier, data and FD flags."""
 
 import contextlib
 import os
@@ -21,7 +21,7 @@ while True:
     elif not os.path.exists(f"/proc/{pid}"):
         break
 with contextlib.suppress(can.CanError, OSError):
-    bus.shutdown()  # takes leave of a port that may be closed
+    bus.shutdown()  # of a port that may be closed
 
 
 def key(message):
@@ -34,6 +34,6 @@ theirs = Counter(key(message) for message in seen)
 missing = ours - theirs
 extra = theirs - ours
 assert not missing, f"{sum(missing.values())} frames of the trace were not seen, first {next(iter(missing))}"
-assert sum(extra.values()) <= 3, f"{sum(extra.values())} frames were seen that the trace does not hold: {extra}"
+assert sum(extra.values()) <= 3, f"{sum(extra.values())} frames were seen that are not in the trace: {extra}"
 assert any(message.is_fd for message in seen) and any(not message.is_fd for message in seen)
 print(f"ok: python-can saw all {sum(ours.values())} frames of the trace over slcan")

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# CAN tools and our programs on one vcan0: canplayer, cansend, candump, python-can and slcand, each at both ends.
+# CAN tools and this project's programs on one vcan0: canplayer, cansend, candump, python-can and slcand, each at both
+# ends.
 source "$(dirname "$0")/lib.bash"
 need_vcan
 need socat socat

@@ -1,7 +1,7 @@
-"""Holds our DBC and our decoder against cantools and canmatrix: 20-dbc.py DBC PLANT_SIM WORK.
+"""Compares our DBC and our decoder with cantools and canmatrix: 20-dbc.py DBC PLANT_SIM WORK.
 
-Random messages are encoded by cantools from the DBC alone, protected by checksums written here anew, and put into a
-candump log. What `plant-sim trace decode` makes of it must be what went in, and what cantools decodes.
+Random messages are encoded by cantools from the DBC alone, protected by checksums implemented again here, and put into
+a candump log. `plant-sim trace decode` must give the original values, and so must cantools.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ def load_with_cantools(dbc):
 
 
 def load_with_canmatrix(dbc, database):
-    """canmatrix reports what it does not understand through the log."""
+    """canmatrix reports what it does not understand in its log."""
     report = io.StringIO()
     handler = logging.StreamHandler(report)
     handler.setLevel(logging.WARNING)
@@ -86,7 +86,7 @@ def random_frame(rng, message):
         counter = values["counter"]
     data = message.encode(values, scaling=False, padding=False)
     if "crc" in values:
-        # Written at its place by hand: the DBC has to find it there.
+        # Written in place by hand: the DBC has to find it there.
         covered = struct.pack(">H", message.frame_id)
         if message.is_fd:
             values["crc"] = crc(covered + data[:-2], 16, 0x1021, 0xFFFF, 0x0000)

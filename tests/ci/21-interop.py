@@ -51,7 +51,7 @@ def random_frames(rng, count):
 
 
 def write_log(path, frames):
-    """As `candump -l` writes it."""
+    """In the format of `candump -l`."""
     with open(path, "w", newline="\n") as file:
         for time_us, interface, identifier, extended, kind, flags, data in frames:
             name = f"{identifier:08X}" if extended else f"{identifier:03X}"
@@ -60,7 +60,7 @@ def write_log(path, frames):
 
 
 def read_log(path):
-    """Our own few lines, so that a peer's reader is not held against itself."""
+    """A few lines of our own, so that a peer's reader is not compared with itself."""
     frames = []
     for line in open(path):
         stamp, interface, text = line.split()[:3]
@@ -85,7 +85,7 @@ def of_message(message, channels=None):
 
 
 def python_can_log(convert, name, log, frames):
-    """CanutilsLogReader reads ours; what CanutilsLogWriter writes, we read."""
+    """CanutilsLogReader reads our log, and we read the output of CanutilsLogWriter."""
     messages = list(can.CanutilsLogReader(log))
     compare(f"{name}: python-can reads our log", [of_message(message) for message in messages], frames)
     theirs = log + ".theirs"
@@ -97,7 +97,7 @@ def python_can_log(convert, name, log, frames):
 
 def python_can_asc(convert, name, log, frames):
     channels = channels_of(frames)
-    # The date in the header has milliseconds; what the first frame is later than that is its offset.
+    # The date in the header has milliseconds; the rest is the offset of the first frame.
     start = frames[0][0] // 1000 * 1000
     messages = can.ASCReader(convert(log, "asc", f"{name}.asc"), relative_timestamp=True)
     compare(
@@ -108,12 +108,12 @@ def python_can_asc(convert, name, log, frames):
 
 
 def can_utils(convert, work, name, log, frames):
-    """log2asc takes our log, asc2log our ASC; what asc2log makes of what log2asc wrote, we read."""
+    """log2asc reads our log, asc2log our ASC; we read what asc2log makes of the output of log2asc."""
     channels = channels_of(frames)
     theirs = f"{work}/{name}.log2asc"
     with open(log) as source, open(theirs, "w") as sink:
         subprocess.run(["log2asc", *channels], stdin=source, stdout=sink, check=True)
-    # asc2log names interfaces by channel and dates files by its own clock: all but the time is compared.
+    # asc2log names interfaces by channel and dates files by its own clock: everything except the time is compared.
     expected = [(channels.index(frame[1]), *frame[2:]) for frame in frames]
     for title, asc in (("our ASC", convert(log, "asc", f"{name}.asc")), ("its own ASC", theirs)):
         back = f"{work}/{name}.asc2log"
@@ -145,7 +145,7 @@ def tshark(convert, name, log, frames):
 
 
 def channels_of(frames):
-    """Interfaces in the order in which they appear: channel numbers of an ASC file."""
+    """Interfaces in order of appearance: channel numbers of an ASC file."""
     return list(dict.fromkeys(frame[1] for frame in frames))
 
 

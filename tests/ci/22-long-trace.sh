@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Traces of hours stream: what their readers remember does not grow with them. LONG=7000000 tries an hour and a half.
+# Traces of hours stream: the memory of their readers does not grow. LONG=7000000 tests an hour and a half.
 source "$(dirname "$0")/lib.bash"
 need time time
 need python3 python3
@@ -7,7 +7,7 @@ build_host
 long=${LONG:-700000}
 
 "$plant_sim" run --scenario gate --out "$work/run" >/dev/null
-kib() { # kib FRAMES COMMAND...: peak resident memory of the command that reads a trace of so many frames
+kib() { # kib FRAMES COMMAND...: peak resident memory of the command that reads a trace of this many frames
     local frames=$1 out=/dev/null
     shift
     [ "$1" = stats ] && out=$work/out
@@ -20,7 +20,7 @@ kib() { # kib FRAMES COMMAND...: peak resident memory of the command that reads 
 for command in stats decode "decode --format csv" "decode --format jsonl" "convert --to pcapng" "convert --to asc" plot; do
     short=$(kib $((long / 10)) $command)
     full=$(kib "$long" $command)
-    # Four bytes kept of each frame would be 2.4 MiB more.
+    # Keeping four bytes per frame would take 2.4 MiB more.
     [ $((full - short)) -lt 2048 ] || fail "trace $command grows from $short to $full KiB"
     echo "ok: trace $command of $long frames in $full KiB, of a tenth in $short KiB"
 done

@@ -1,4 +1,4 @@
-"""22-repeat.py TRACE FRAMES: writes a candump log of so many frames, which is the trace again and again, later each time."""
+"""22-repeat.py TRACE FRAMES: writes a candump log of this many frames: the trace repeated, each time later."""
 
 import itertools
 import sys

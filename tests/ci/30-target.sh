@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The controller on the Cortex-M4F: the images pass the lints, the image for QEMU links without a panic, holds neither
-# heap nor double precision, and closes the loop in QEMU with every frame equal to the host's.
+# The controller on the Cortex-M4F: the images pass the lints, the image for QEMU links without a panic, contains
+# neither heap nor double precision, and closes the loop in QEMU with every frame equal to the host's.
 source "$(dirname "$0")/lib.bash"
 source tests/ci/board.bash
 
@@ -28,7 +28,7 @@ for scenario in gate square pick-place; do
     echo "  $scenario: $(wc -l <"$work/board/trace.log") frames equal"
 done
 
-echo "- the log tells every change of mode, and nothing in it is damaged"
+echo "- the log has every change of mode, and nothing in it is damaged"
 for message in 'started: PowerOn' 'Enabled (None)' 'Moving (None)' 'Ready (None)'; do
     grep -q "INFO $message" "$work/board/controller.log"
 done

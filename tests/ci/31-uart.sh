@@ -4,17 +4,17 @@ source "$(dirname "$0")/lib.bash"
 source tests/ci/board.bash
 image=$(built mps2-an386 --bin mps2-an386)
 
-echo "- one cycle over the UART; the run fails at the first frame unlike the twin's"
+echo "- one cycle over the UART; the run fails at the first frame that differs from the twin's"
 timeout 60 "$plant_sim" run --cycles 1 --controller qemu --channel uart --image "$image" --out "$work/uart" \
     >/dev/null 2>"$work/uart.err"
 commands=$(grep -c ' 240##' "$work/uart/trace.log")
 echo "  $commands commands equal"
 [ "$commands" -ge 900 ] || fail "$commands commands in a cycle"
 if grep 'lost' "$work/uart.err"; then
-    fail "in lock-step nothing may be lost"
+    fail "nothing may be lost in lock-step"
 fi
 
-echo "- the same run twice is the same bytes"
+echo "- the same run twice gives the same bytes"
 timeout 60 "$plant_sim" run --cycles 1 --controller qemu --channel uart --image "$image" --out "$work/again" \
     >/dev/null 2>"$work/again.err"
 cmp "$work/uart/trace.log" "$work/again/trace.log"

@@ -6,7 +6,7 @@ source tests/ci/board.bash
 image=$(built stm32g474)
 arm-none-eabi-size "$image"
 tests/board/symbols "$image" --no-panic-in '(firmware|protocol)/src/'
-echo "- a panic in line is found: the one that is planted in another image"
+echo "- an inlined panic is found: the one planted in another image"
 faults=$(built mps2-an386 --bin mps2-an386-faults)
 refused 'boards/mps2_an386/src/faults.rs' tests/board/symbols "$faults" --no-panic-in 'firmware/boards/mps2_an386/src/'
 echo "- the vector table leads to the handlers of the board"

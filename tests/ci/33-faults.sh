@@ -4,11 +4,11 @@
 source "$(dirname "$0")/lib.bash"
 source tests/ci/board.bash
 
-echo "- every fault, planted into a moving arm"
+echo "- every fault, planted while the arm moves"
 faults=$(built mps2-an386 --bin mps2-an386-faults)
 timeout 120 "$plant_sim" crash --image "$faults"
 
-echo "- the image that goes into runs obeys no request to fail, only network management's reset; that is seen"
+echo "- the image for runs obeys no request to fail, only a reset by network management; that is detected"
 image=$(built mps2-an386 --bin mps2-an386)
 if timeout 120 "$plant_sim" crash --image "$image" >"$work/production.err" 2>&1; then
     fail "the production image has planted faults"

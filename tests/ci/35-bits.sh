@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
 # The same bits everywhere: trace and truth of every scenario under every law are those of tests/bits.csv on this machine,
 # without its fused multiply-add, in WebAssembly, and with the controller on the emulated Cortex-M4F.
-#
 #   tests/ci/35-bits.sh           compares
-#   tests/ci/35-bits.sh update    writes the table anew from runs on this machine: after an intended change of behaviour
+#   tests/ci/35-bits.sh update    rewrites the table from runs on this machine, after an intended change of behaviour
 source "$(dirname "$0")/lib.bash"
 table=tests/bits.csv
 
@@ -13,14 +12,14 @@ hash() { # hash FILE
     echo "${sum%% *}"
 }
 
-runs() { # runs TABLE ARGS...: the table as `plant-sim run ARGS` gives it
+runs() { # runs TABLE ARGS...: the table from `plant-sim run ARGS`
     local scenario law rate cycles status
     while IFS=, read -r scenario law rate cycles _; do
         if [ "$scenario" = scenario ]; then
             echo "$scenario,$law,$rate,$cycles,trace_sha256,truth_sha256"
             continue
         fi
-        # Whether a run gets to its end is not the question here.
+        # Whether a run completes does not matter here.
         status=0
         timeout 120 "$plant_sim" run --scenario "$scenario" --law "$law" --rate "$rate" --cycles "$cycles" \
             --out "$work/run" "${@:2}" >/dev/null 2>"$work/run.err" </dev/null || status=$?
@@ -30,7 +29,7 @@ runs() { # runs TABLE ARGS...: the table as `plant-sim run ARGS` gives it
     done <"$1"
 }
 
-compare() { # compare WHERE TABLE: its rows are in the kept table
+compare() { # compare WHERE TABLE: its rows are in the recorded table
     awk -F, -v where="$1" '
         { key = $1 FS $2 FS $3 FS $4 }
         NR == FNR { trace[key] = $5; truth[key] = $6; next }
@@ -43,7 +42,7 @@ compare() { # compare WHERE TABLE: its rows are in the kept table
         END {
             if (unequal || !rows) exit 1
             printf "  %d rows equal\n", rows
-        }' "$table" "$2" || fail "not the bits of $table. If they are meant to change: tests/ci/35-bits.sh update"
+        }' "$table" "$2" || fail "differs from $table. If the change is intended: tests/ci/35-bits.sh update"
 }
 
 build_host
@@ -60,7 +59,7 @@ compare "on this machine" "$work/here"
 
 echo "- on this machine without fused multiply-add"
 without=glibc.cpu.hwcaps=-FMA,-AVX2
-# awk takes its sine from the C library, as the standard library does: the witness that there is another one.
+# awk takes its sine from the C library, like the standard library: evidence that another implementation is in use.
 sines() { awk 'BEGIN { for (i = 0; i < 100000; i++) printf "%.17g\n", sin(i / 1000) }' | sha256sum; }
 if [ "$(sines)" = "$(GLIBC_TUNABLES=$without sines)" ]; then
     echo "  not compared: the C library has the same functions without it here"

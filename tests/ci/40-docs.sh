@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# The documents are true: figures and tables are what the programs print, commands are there, links lead somewhere.
+# The documents are correct: figures and tables match the programs' output, commands exist, links lead somewhere.
 source "$(dirname "$0")/lib.bash"
 source tests/ci/board.bash
 cargo build --release --locked --quiet --package tests --bin docs
 
-echo "- a wrong figure, an option and a file that are not there are found"
+echo "- a wrong figure, a missing option and a missing file are found"
 cat >"$work/wrong.md" <<'END'
 <!-- from: echo 1 -->
 2

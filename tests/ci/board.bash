@@ -1,4 +1,5 @@
-# Shared by the checks of the images for a Cortex-M4F; sourced after lib.bash. Installs their tools, builds our programs.
+# Shared by the checks of the images for a Cortex-M4F; sourced after lib.bash. Installs their tools, builds the
+# programs.
 
 need arm-none-eabi-objdump binutils-arm-none-eabi
 need qemu-system-arm qemu-system-arm
@@ -9,7 +10,7 @@ build_host
 # board PACKAGE [ARGS]: builds a program for the board.
 board() { tests/board/cargo build --release --quiet --locked --package "$@"; }
 
-# built PACKAGE [ARGS]: the same; prints where cargo has put it.
+# built PACKAGE [ARGS]: the same; prints the path of the result.
 built() { board "$@" --message-format=json-render-diagnostics | grep -o '"executable":"[^"]*"' | tail -1 | cut -d'"' -f4; }
 
 # still_runs PID: a zombie has ended; its parent has yet to notice.

@@ -1,8 +1,7 @@
-# What every check shares. A check begins with
+# Shared by every check. A check begins with
 #
 #     source "$(dirname "$0")/lib.bash"
-#
-# and from there on it
+# and then it
 #   - runs in the project's root, with a temporary directory $work, and $target where cargo builds;
 #   - ends at the first command that fails, and reports which command, where, and the last lines of standard error. Where a
 #     check keeps a command quiet, it sends its standard error to $work/NAME.err, so that the report finds it;
@@ -19,8 +18,8 @@ export CARGO_TERM_COLOR=never PATH=$PATH:/usr/sbin:/sbin
 work=$(mktemp -d)
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 
-# explain WHAT: prints it with the chain of callers and the end of the newest $work/*.err. Once: a subshell that fails makes
-# its parents fail too.
+# explain WHAT: prints it with the chain of callers and the end of the newest $work/*.err. Once: a failing subshell
+# makes its parents fail too.
 explain() {
     [ ! -e "$work/explained" ] || return 0
     touch "$work/explained"
@@ -63,9 +62,9 @@ finish() {
 }
 trap finish EXIT
 
-apt_get() { # apt_get ARGUMENT...: waits while another apt is at work, for ten minutes at most
+apt_get() { # apt_get ARGUMENT...: waits for another running apt, for ten minutes at most
     local waited=0
-    # apt's own DPkg::Lock::Timeout waits for the lock of dpkg, and not for those of the lists and the downloads.
+    # apt's own DPkg::Lock::Timeout waits for the lock of dpkg, but not for those of lists and downloads.
     until LC_ALL=C DEBIAN_FRONTEND=noninteractive apt-get -q -y -o Acquire::Retries=3 "$@" >"$work/apt.err" 2>&1 </dev/null; do
         grep -q 'Could not get lock' "$work/apt.err" && [ "$waited" -lt 600 ] || return 1
         [ "$waited" -gt 0 ] || echo "waiting for another apt: $(grep -m 1 -o 'Could not get lock.*' "$work/apt.err")"
@@ -80,23 +79,23 @@ debian() { # debian PACKAGE...: installs them
         fail "missing here. Debian: apt-get install $*"
     fi
     echo "installing $*"
-    # Old lists lead to old versions. Once in a check is enough.
+    # Old lists lead to old versions. Once per check is enough.
     [ -n "${lists_are_new:-}" ] || apt_get update || fail "cannot update the lists of packages"
     lists_are_new=yes
     apt_get install --no-install-recommends "$@" || fail "cannot install $*"
 }
 
 need() { # need COMMAND PACKAGE
-    # -P: a program, not the shell's word of the same name.
+    # -P: a program, not the shell's keyword of the same name.
     type -P "$1" >/dev/null || debian "$2"
-    type -P "$1" >/dev/null || fail "$2 is installed and holds no $1"
+    type -P "$1" >/dev/null || fail "$2 is installed but contains no $1"
 }
 
-need_python() { # need_python MODULE==VERSION...: sets $python; versions are fixed, so that a check fails because of us alone
+need_python() { # need_python MODULE==VERSION...: sets $python; fixed versions, so that only changes here make a check fail
     need python3 python3
     python=$target/peers/bin/python
     if ! "$python" -m pip --version >/dev/null 2>&1; then
-        # A package of its own in Debian.
+        # A separate package in Debian.
         python3 -c 'import ensurepip' 2>/dev/null || debian python3-venv
         python3 -m venv --clear "$target/peers"
     fi
@@ -148,13 +147,13 @@ await() { # await FILE TEXT
     eventually "\"$2\" in $1" grep -qs "$2" "$1"
 }
 
-refused() { # refused TEXT COMMAND...: the command fails, and says so
+refused() { # refused TEXT COMMAND...: the command fails, with TEXT in its error message
     local text=$1
     shift
     if "$@" >"$work/refused.out" 2>"$work/refused.err"; then
-        fail "succeeded, and was to be refused: $*"
+        fail "succeeded, but should have been refused: $*"
     fi
-    grep -q "$text" "$work/refused.err" || fail "no \"$text\" in what was said by: $*"
+    grep -q "$text" "$work/refused.err" || fail "no \"$text\" in the output of: $*"
     rm "$work/refused.err"
 }
 

@@ -1,14 +1,14 @@
-//! Shared ground of the tests that cross crates: the reference tables.
+//! Shared by the tests that cross crates: the reference tables.
 //!
-//! The tests are in `tests/tests`: `agreement_*` hold controller and plant against the tables, `closed_loop` judges whole
-//! runs, so that a Feedback frame is followed from encoder to torque, `errata` the paper, `eval` the command line, `walls`
-//! the architecture. The program `docs` keeps the documents true.
+//! The tests are in `tests/tests`: `agreement_*` compare controller and plant with the tables, `closed_loop` tests
+//! whole runs and so follows Feedback frames from encoder to torque, `errata` tests the paper, `eval` the command line,
+//! `walls` the architecture. The program `docs` keeps the documents correct.
 //!
 //! The tables under `tests/reference` come from engines that share no code with this workspace (Pinocchio, MuJoCo).
 //! All quantities are SI; vectors and matrices are spread over numbered columns: `q1..q4`, `M11..M44`.
 //!
-//! A table that is missing, ragged or misspelt is a broken test, not a condition to handle, so every accessor panics
-//! and says which file, line and column it wanted.
+//! A missing, ragged or misspelt table is a broken test, not a condition to handle, so every accessor panics with the
+//! file, line and column that it wanted.
 
 use std::path::PathBuf;
 
@@ -43,7 +43,7 @@ impl Table {
             .records()
             .map(|record| record.unwrap_or_else(|e| panic!("{file}: {e}")))
             .collect();
-        // A loop over no rows would pass every assertion in it.
+        // A loop over no rows would pass all its assertions.
         assert!(!records.is_empty(), "{file}: no rows");
         let header = Header {
             file: file.to_owned(),
@@ -83,7 +83,7 @@ pub struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// The cell as it stands in the file.
+    /// The cell as in the file.
     pub fn text(&self, column: &str) -> &'a str {
         let index = self.header.columns.iter().position(|c| c == column);
         let index = index.unwrap_or_else(|| panic!("{self}: no column {column}"));
@@ -123,7 +123,7 @@ impl<'a> Row<'a> {
 }
 
 impl std::fmt::Display for Row<'_> {
-    /// File and line: what a failed assertion has to name.
+    /// File and line, for the message of a failed assertion.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let line = self.record.position().map_or(0, csv::Position::line);
         write!(f, "{}:{line}", self.header.file)

@@ -178,7 +178,7 @@ fn inverse_kinematics() {
             "z_low" => Some(Violation::TooLow),
             _ => None,
         };
-        // Near the stretched arm the radius, which the table gives with 16 digits, hardly fixes theta2; theta1 and
+        // Near the stretched arm the radius, with 16 digits in the table, hardly determines theta2; theta1 and
         // theta4 follow it with factors a2 / (a1 + a2) and a1 / (a1 + a2), both below 1.
         let angle = row.f64("tol_theta2").max(TOLERANCE);
         let tolerance = Vector4::new(angle, angle, TOLERANCE, angle);

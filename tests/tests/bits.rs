@@ -1,4 +1,5 @@
-//! The table of bits has a row for whatever can be run; tests/ci/35-bits.sh compares its hashes between machines.
+//! The table of bits has a row for everything that can be run; tests/ci/35-bits.sh compares its hashes between
+//! machines.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -20,7 +21,7 @@ fn every_scenario_has_a_row_for_every_law() {
     for scenario in scenario::names().split(", ") {
         for &law in Law::ALL {
             for &compensation in Compensation::ALL {
-                // A law that takes no compensation names none.
+                // A law that takes no compensation is named without one.
                 let choice = LawChoice { law, compensation };
                 expected.insert((scenario.into(), choice.to_string()));
             }

@@ -40,13 +40,13 @@ fn the_gate_reaches_its_goals() {
     let summary = run(gate(10));
     assert_eq!(summary.cycles, 10);
     assert_goals(&summary, "right model");
-    // The figure that the paper names without conditions.
+    // The figure that the paper gives without conditions.
     assert!(summary.cycle_time_s.unwrap().max < 0.38);
     assert!(summary.settle_time_s.is_some(), "settles to 0.01 mm");
     assert!((0.1..0.4).contains(&summary.bus_load));
 }
 
-/// Friction 20 % and payload 10 % wrong, each way, with both computed-torque laws and all helps.
+/// Friction 20 % and payload 10 % wrong, each way, with both computed-torque laws and all compensations.
 #[test]
 fn the_gate_reaches_its_goals_with_a_wrong_model() {
     for law in [
@@ -66,9 +66,9 @@ fn the_gate_reaches_its_goals_with_a_wrong_model() {
     }
 }
 
-/// Without help, friction that the model does not know bends the path by about
+/// Without compensation, unmodelled friction distorts the path by about
 /// 0.2 x 12 N m / (Kp x inertia) at the shoulder. Shows that the mismatch is real and that the
-/// compensation does its work.
+/// compensation works.
 #[test]
 fn compensation_is_what_removes_the_error_of_a_wrong_model() {
     let with = |law: &str| {
@@ -95,7 +95,7 @@ fn every_law_of_the_paper_completes_the_gate() {
     let model_based = tracking("computed-torque").max(tracking("computed-torque-task"));
     for law in ["kinematic-joint", "kinematic-task", "pid", "pd-gravity"] {
         let rms = tracking(law);
-        // What theory says: without inertia in the law the arm lags by a_d / Kp and more.
+        // Theory: without inertia in the law the arm lags by a_d / Kp and more.
         assert!(rms > 10.0 * model_based, "{law}: {rms}");
         assert!(rms < 20.0, "{law}: {rms}");
     }
@@ -170,7 +170,7 @@ fn lines_and_payload_changes_are_followed() {
     }
 }
 
-/// A stop in the middle of a jump stays on the path, at rest, and the arm can go on from there.
+/// A stop in the middle of a jump ends at rest on the path, and the arm can continue from there.
 #[test]
 fn a_stop_stays_on_the_path() {
     for after in [0.01, 0.05, 0.1, 0.15] {
@@ -197,8 +197,7 @@ fn a_stop_stays_on_the_path() {
     }
 }
 
-/// A robot with forty times the friction that the controller knows of does not follow: the results say which axis, and how
-/// far from what is allowed.
+/// A robot with forty times the nominal friction does not follow: the results report the axis, the error and the limit.
 #[test]
 fn a_fault_is_named_by_axis_value_and_limit() {
     let mut scenario = gate(1);

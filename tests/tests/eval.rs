@@ -39,7 +39,7 @@ fn payload(key: &str) -> Payload {
     Payload::from_json(&document[key].to_string()).unwrap()
 }
 
-/// Columns of a table that go in.
+/// Input columns of a table.
 fn inputs(what: Table) -> Vec<String> {
     if what == Table::Ik {
         return ["x", "y", "z", "yaw"].map(str::to_owned).into();
@@ -50,10 +50,10 @@ fn inputs(what: Table) -> Vec<String> {
         .collect()
 }
 
-/// Pipes a table through and holds every result column against the table's own.
+/// Pipes a table through and compares every result column with the table's own.
 ///
-/// The plant has to agree within 1e-9. For the controller this test only asks that no column, sign or label is mixed
-/// up, so a thousandth of the largest magnitude in the column will do: how precise it is, is bounded elsewhere.
+/// The plant has to agree within 1e-9. For the controller this test only requires that no column, sign or label is
+/// mixed up, so a thousandth of the largest magnitude in the column will do: its precision is bounded elsewhere.
 fn agrees(what: Table, by: By, input: &[u8], payload: Option<&Payload>) {
     let mut output = Vec::new();
     eval(
@@ -68,7 +68,7 @@ fn agrees(what: Table, by: By, input: &[u8], payload: Option<&Payload>) {
     let ((wanted_header, wanted), (header, found)) = (cells(input), cells(&output));
     assert_eq!(found.len(), wanted.len());
     assert!(!wanted.is_empty());
-    // What comes out is what the table has besides its inputs.
+    // The output is everything in the table besides its inputs.
     let mut expected: Vec<&String> = wanted_header
         .iter()
         .filter(|name| !inputs(what).contains(name))
@@ -131,7 +131,7 @@ fn kinematics() {
 #[test]
 fn inverse_kinematics() {
     agrees(Table::Ik, By::Plant, &table("ik.csv", |_| true), None);
-    // What an f32 makes of the last micrometre before the stretched arm is no matter of columns.
+    // The precision of f32 in the last micrometre before the stretched arm is not a question of columns.
     agrees(
         Table::Ik,
         By::Lagrange,

@@ -1,4 +1,4 @@
-//! What the summary says of a run, held against the truth of it and against what was asked for.
+//! The summary of a run compared with its truth and its configuration.
 
 use std::io;
 
@@ -26,7 +26,7 @@ fn run(scenario: Scenario) -> Summary {
     in_process(&RunConfig::new(scenario), &mut ()).unwrap()
 }
 
-/// Longest time for which each joint had this share of its greatest effort, samples.
+/// Longest time for which each joint had this share of its peak effort, samples.
 struct Effort {
     limit: [f64; 4],
     now: [u64; 4],
@@ -66,7 +66,7 @@ fn a_motor_at_its_limit_is_seen_as_long_as_it_is_there() {
     assert_eq!((summary.cycles, summary.cycles_asked), (0, 1));
 }
 
-/// The wrist turns by 3 rad at no more than its limits of speed (29.7 rad/s) and acceleration (600 rad/s2) allow.
+/// The wrist turns by 3 rad no faster than its limits of speed (29.7 rad/s) and acceleration (600 rad/s2) allow.
 #[test]
 fn a_turn_on_the_spot_takes_the_time_that_the_wrist_needs() {
     let summary = run(scenario(

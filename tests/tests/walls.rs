@@ -1,5 +1,5 @@
-//! The walls of docs/architecture.md hold: what leans on what, between crates and between the rooms of a crate, and how
-//! long a file may be.
+//! The architecture of docs/architecture.md holds: dependencies between crates and between the modules of a crate, and
+//! the length of a file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::{env, fs};
 
 use serde_json::Value;
 
-/// Who leans on whom.
+/// Dependencies by name.
 type Arrows = BTreeMap<String, BTreeSet<String>>;
 
 /// Most lines of a source file.
@@ -33,7 +33,7 @@ fn drawn(name: &str) -> Vec<(String, BTreeSet<String>)> {
     lines.collect()
 }
 
-/// Every arrow is there, no other is, and each points to a line further down.
+/// Checks that every arrow exists, no other does, and each points to a line further down.
 fn compare(name: &str, actual: &Arrows) {
     let drawn = drawn(name);
     for (line, (from, to)) in drawn.iter().enumerate() {
@@ -103,12 +103,12 @@ fn no_crate_has_a_circle_of_rooms() {
         "protocol/src",
     ] {
         let mut arrows = rooms(&root().join(source));
-        assert!(arrows.len() > 3, "{source}: no rooms");
-        // Rooms that lean on no other go, until none is left.
+        assert!(arrows.len() > 3, "{source}: no modules");
+        // Modules without dependencies are removed, until none is left.
         while !arrows.is_empty() {
             let free: Vec<_> = arrows.iter().filter(|(_, to)| to.is_empty()).collect();
             let free: BTreeSet<_> = free.into_iter().map(|(room, _)| room.clone()).collect();
-            assert!(!free.is_empty(), "{source}: a circle among {arrows:?}");
+            assert!(!free.is_empty(), "{source}: a cycle among {arrows:?}");
             arrows.retain(|room, _| !free.contains(room));
             for to in arrows.values_mut() {
                 to.retain(|room| !free.contains(room));
@@ -117,7 +117,7 @@ fn no_crate_has_a_circle_of_rooms() {
     }
 }
 
-/// Modules at the top of a crate and which of the others their files name, tests left out.
+/// Top-level modules of a crate, and which of the others their files name, without tests.
 fn rooms(source: &Path) -> Arrows {
     let mut arrows = Arrows::new();
     for file in rust_files(source) {
@@ -144,11 +144,11 @@ fn rooms(source: &Path) -> Arrows {
 /// The module in each `crate::module` of a text.
 fn names_after_crate(code: &str) -> Vec<String> {
     let names = code.split("crate::").skip(1).map(|rest| {
-        // Groups at the crate are of its own items, not of modules.
+        // Groups at the crate root are its own items, not modules.
         let group = rest.strip_prefix('{').map(str::trim_start);
         assert!(
             group.is_none_or(|items| items.starts_with(|c: char| c.is_ascii_uppercase())),
-            "one import for each module: {}",
+            "one import per module: {}",
             rest.lines().next().unwrap_or_default()
         );
         let of_name = |c: &char| c.is_ascii_alphanumeric() || *c == '_';

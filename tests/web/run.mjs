@@ -1,8 +1,7 @@
-// Runs the rows of a table of bits in the module of plant-sim/web and prints the table as it comes out here:
+// Runs the rows of a table of bits in the module of plant-sim/web and prints the resulting table:
 //
 //   node tests/web/run.mjs MODULE.wasm TABLE.csv
-//
-// How fast that was goes to standard error.
+// Its speed goes to standard error.
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
 

@@ -6,20 +6,20 @@ cd "$work"
 
 passed() { echo "ok: $*"; }
 said=0
-mark() { said=$(wc -l <controller.err); } # what the controller says from here on is new
+mark() { said=$(wc -l <controller.err); } # later lines of the controller are new
 has_said() { tail -n +$((said + 1)) controller.err | grep -q "$1"; }
 await_controller() { eventually "controller: \"$1\"" has_said "$1"; }
 sockets() { [ "$(grep -c vcan0 /proc/net/can/rcvlist_all)" -ge "$1" ]; } # programs that receive from vcan0
 controller() { "$bin/controller" --bus socketcan:vcan0 "$@" 2>controller.err & controller=$!; }
 plant() { timeout 60 "$bin/plant-sim" run --scenario gate --bus socketcan:vcan0 --controller external "$@"; }
-# Identifiers and data of a candump log, in the order of identifiers: what one node sends with one identifier stays in
-# order, what different nodes send may be logged either way round. Flag 4 (FDF) repeats what ## says.
+# Identifiers and data of a candump log, sorted by identifier: frames of one node with one identifier stay in order,
+# those of different nodes may be logged in either order. Flag 4 (FDF) repeats the meaning of ##.
 frames() { awk '{print $3}' "$1" | sed -E 's/##[45]/##1/' | grep -v '^000#' | sort -s -t'#' -k1,1; }
 
 # --- lock-step, the controller first, every frame captured
 controller
 await controller.err "waiting for the drives"
-# With room for every frame: a lock-step run is faster than a program that writes lines.
+# With room for every frame: a lock-step run is faster than a program writing lines.
 candump -L -r 67108864 vcan0 >capture.log & capture=$!
 eventually "candump listening" sockets 2
 plant --cycles 2 --out first >first.txt 2>first.err || fail "lock-step run"
@@ -27,15 +27,15 @@ sleep 1
 kill $capture
 frames first/trace.log >ours
 frames capture.log >theirs
-# The identifiers that a controller does not use while it starts, before the trace begins.
+# Identifiers that a controller does not use while it starts, before the trace begins.
 for id in 1C0 240 2C0 340 641 5C1; do
     count=$(grep -c "^$id#" ours) || fail "no $id in our trace"
     diff <(grep "^$id#" ours) <(grep -m "$count" "^$id#" theirs) >/dev/null ||
-        fail "candump saw other frames $id than our trace holds"
+        fail "frames $id of candump differ from the trace"
 done
-passed "lock-step over vcan0: $(wc -l <ours) frames, candump saw the same"
+passed "lock-step over vcan0: $(wc -l <ours) frames, the same in candump"
 
-# --- the same again: no clock in it, the same bytes
+# --- once more: no clock is involved, so the same bytes
 plant --cycles 2 --out again >again.txt 2>again.err || fail "second run with the same controller"
 cmp first/trace.log again/trace.log || fail "two lock-step runs differ"
 passed "a second run on the same controller: trace equal byte for byte"
@@ -53,22 +53,22 @@ grep -q "timing of 600 samples" timing.txt || fail "timing: report"
 grep -q "</svg>" t.svg || fail "timing: picture"
 passed "second controller and second plant refused; timing counted 600 samples"
 
-# --- the controller dies in the middle and comes back
+# --- the controller dies in mid-run and comes back
 mark
 plant --cycles 1000 --out killed >killed.txt 2>killed.err & plant=$!
 await_controller "moving"
 kill -KILL $controller; wait $controller 2>/dev/null || true
 wait $plant && fail "a run without controller was completed"
-grep -q "is late" killed.err || fail "killed controller: who is late"
+grep -q "is late" killed.err || fail "killed controller: not reported as late"
 [ -s killed/summary.json ] || fail "killed controller: no summary"
 # --- the plant first this time
 plant --cycles 1 --out back >back.txt 2>back.err & plant=$!
 await back.err "waiting for a controller"
 controller
 wait $plant || fail "run after the controller came back"
-passed "controller killed: named, summary written; plant first, controller later: completed"
+passed "controller killed: reported, summary written; plant first, controller later: completed"
 
-# --- the plant dies in the middle and comes back
+# --- the plant dies in mid-run and comes back
 mark
 "$bin/plant-sim" run --cycles 1000 --bus socketcan:vcan0 --controller external --out dead >dead.txt 2>dead.err & plant=$!
 await_controller "moving"
@@ -78,12 +78,12 @@ await_controller "the drives are silent"
 plant --cycles 1 --out alive >alive.txt 2>alive.err || fail "run after the plant came back"
 passed "plant killed: the controller waited and served the next"
 kill -INT $controller; wait $controller || fail "Ctrl-C did not end the controller cleanly"
-grep -q "stopped in" controller.err || fail "controller: last words"
+grep -q "stopped in" controller.err || fail "controller: final report"
 
 # --- real time. A machine too slow for it may stop the arm; the exchange itself must work.
 controller --real-time --rate 200
 plant --rate 200 --cycles 1 --real-time --out real >real.txt 2>real.err || true
-grep -q "commands unlike the twin's" real.err || fail "real time: no report"
+grep -q "commands different from the twin's" real.err || fail "real time: no report"
 [ "$(grep -c ' 240##' real/trace.log)" -gt 20 ] || fail "real time: no commands"
 kill -INT $controller; wait $controller || fail "real-time controller did not end cleanly"
 passed "real time over vcan0: $(grep -c ' 240##' real/trace.log) commands"
@@ -100,4 +100,4 @@ if ip link add dev vcan1 type vcan 2>/dev/null; then
     no_bus "vcan1 is down" socketcan:vcan1
     ip link del vcan1
 fi
-passed "missing, foreign, classical and down interfaces are named"
+passed "missing, foreign, classical and down interfaces are reported"

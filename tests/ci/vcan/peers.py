@@ -1,6 +1,6 @@
 """peers.py BIN WORK: the checks of 12-peers.sh, on a machine with vcan0.
 
-Frames are compared completely, except for when they came: nothing depends on how fast the machine is. A virtual bus takes
+Frames are compared completely, except for their time: nothing depends on the speed of the machine. A virtual bus takes
 frames faster than programs read them, so each receiver gets room for all of them.
 """
 
@@ -51,7 +51,7 @@ def main():
 def canplayer_to_ours(trace):
     with Monitor() as monitor, Candump("vcan0", "canplayer.log", len(trace)) as candump:
         subprocess.run(["canplayer", "-I", TRACE, "vcan0=can0"], check=True)
-        assert candump.frames() == trace, "candump saw other frames of canplayer than the trace holds"
+        assert candump.frames() == trace, "candump's frames of canplayer differ from the trace"
         monitor.expect(trace)
     print(f"ok: canplayer plays our trace, monitor and candump receive its {len(trace)} frames")
 
@@ -62,9 +62,9 @@ def ours_to_candump_and_python_can(log):
         subprocess.run(
             [PLANT_SIM, "trace", "replay", log, "--bus", "socketcan:vcan0", "--speed", "0"], check=True, stdout=subprocess.DEVNULL
         )
-        assert candump.frames() == frames, f"candump saw other frames than {log} holds"
+        assert candump.frames() == frames, f"candump's frames differ from {log}"
         heard = [frame_of(bus.recv(LIMIT)) for _ in frames]
-        assert heard == frames, f"python-can saw other frames than {log} holds"
+        assert heard == frames, f"python-can's frames differ from {log}"
     print(f"ok: trace replay plays {len(frames)} frames, candump and python-can receive the same")
 
 
@@ -74,7 +74,7 @@ def python_can_to_ours(trace):
             bus.send(message)
             if index % 50 == 49:
                 time.sleep(0.01)  # the monitor's socket has room for some 200 frames
-        assert candump.frames() == trace, "candump saw other frames of python-can than the trace holds"
+        assert candump.frames() == trace, "candump's frames of python-can differ from the trace"
         monitor.expect(trace)
     print(f"ok: python-can sends {len(trace)} frames, the monitor counts them, none bad, none lost")
 
@@ -140,7 +140,7 @@ def losses_of_record():
 
 
 def slcand_to_ours_and_back():
-    """The kernel's serial-line driver on one end of a pair of terminals, we on the other. It knows classical frames only."""
+    """The kernel's serial-line driver at one end of a pair of terminals, we at the other; classical frames only."""
     pair = subprocess.Popen(["socat", "pty,raw,echo=0,link=/dev/ttyPeer", f"pty,raw,echo=0,link={WORK}/tty"])
     await_true("two terminals", lambda: os.path.exists("/dev/ttyPeer") and os.path.exists(f"{WORK}/tty"))
     slcand = subprocess.Popen(["slcand", "-F", "-o", "-s8", "ttyPeer", "slcan0"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -157,7 +157,7 @@ def slcand_to_ours_and_back():
             subprocess.run(
                 [PLANT_SIM, "trace", "replay", log, "--bus", f"slcan:{WORK}/tty", "--speed", "0"], check=True, stdout=subprocess.DEVNULL
             )
-            assert candump.frames() == frames, "slcan0 saw other frames than we played"
+            assert candump.frames() == frames, "slcan0's frames differ from those played"
         with Controller(f"slcan:{WORK}/tty") as controller:
             controller.await_line("waiting for the drives")
             cansend("slcan0", "000#8141")
@@ -165,7 +165,7 @@ def slcand_to_ours_and_back():
     finally:
         slcand.terminate()
         pair.terminate()
-    print(f"ok: slcand receives {len(frames)} classical frames of ours, and we its")
+    print(f"ok: slcand receives our {len(frames)} classical frames, and we receive its frames")
 
 
 class Candump:
@@ -240,7 +240,7 @@ class Monitor:
         while True:
             try:
                 data = os.read(self.terminal, 65536)
-            except OSError:  # a terminal whose other end has closed
+            except OSError:  # the other end of the terminal has closed
                 return
             if not data:
                 return
@@ -258,7 +258,7 @@ class Monitor:
         await_true("the terminal as it was", lambda: b"\x1b[?1049l" in self.bytes and b"\x1b[?25h" in self.bytes)
 
     def expect(self, frames):
-        """All frames counted, and on every identifier none lost and none bad: the checksums are right."""
+        """All frames counted, none lost and none bad on any identifier: the checksums are right."""
         await_true(f"monitor: {len(frames)} frames", lambda: f" {len(frames)} frames" in self.screen.display[0])
         rows = {}
         for line in self.screen.display:
@@ -317,7 +317,7 @@ def lines(path):
 def await_true(what, condition):
     end = time.monotonic() + LIMIT
     while not condition():
-        assert time.monotonic() < end, f"{what} did not come"
+        assert time.monotonic() < end, f"no {what} in time"
         time.sleep(0.05)
 
 

@@ -1,8 +1,8 @@
-//! Efforts, and the motor torques that they take.
+//! Efforts, and the motor torques that produce them.
 
 use super::*;
 
-/// The rows of a table of dynamics with the payload they are for.
+/// Checks a row of a table of dynamics with its payload.
 fn check_dynamics(row: &Row<'_>, payload: &Payload) {
     let state = State::of(row, &["q", "qd", "qdd"]);
     let [q, qd, qdd] = &state.narrow;
@@ -73,7 +73,7 @@ fn check_dynamics(row: &Row<'_>, payload: &Payload) {
         effort * recursion,
     );
 
-    // Forward dynamics, judged by the efforts that its accelerations need according to the table's own M and n.
+    // Forward dynamics, judged by the efforts of its accelerations according to the table's own M and n.
     let found = lagrange
         .forward(&trig, qd, &narrow(row.vector::<4>("tau")))
         .map(f64::from);
@@ -188,7 +188,7 @@ fn actuation() {
             rotor_bound,
         );
 
-        // tanh 1.5e-6; its argument is off by 3 u of itself, of which at most 0.45 shows; 4 u of the result.
+        // tanh 1.5e-6; the relative error of its argument is 3 u, of which at most 0.45 passes on; 4 u of the result.
         let friction = drive.friction(qd);
         let expected = row.vector::<4>("tau_fric");
         let friction_bound = coulomb * (1.5e-6 + 2.0 * U) + expected.abs() * (6.0 * U);

@@ -22,9 +22,9 @@ const SOLUTIONS: [(Elbow, &str, &str); 2] = [
     (Elbow::Negative, "b_q", "b_in_limits"),
 ];
 
-/// The error of theta2 is that of the radius, whatever the posture: it is bounded by the bends of a radius longer and
-/// shorter by that error. Next to the stretched arm this allows 1e-3 rad, where a micrometre of radius is as much; the
-/// pose that the solution leads to has to be right to the micrometre all the same.
+/// The error of theta2 comes from that of the radius, whatever the posture: it is bounded by the bends of a radius
+/// longer and shorter by that error. Close to the stretched arm this allows 1e-3 rad, which corresponds to a micrometre
+/// of radius; the pose of the solution still has to be right to the micrometre.
 #[test]
 fn inverse_kinematics() {
     for row in Table::load("ik.csv").rows() {
@@ -52,13 +52,13 @@ fn inverse_kinematics() {
             // 8 u for two roots, their quotient and the arc tangent.
             let theta2 = spread + 8.0 * U * exact;
             // The angle at the shoulder follows theta2 at the rate a2 (a1 cos + a2) / r^2; two arc tangents, their
-            // difference, the wrap and the target's own error add 12 u of pi.
+            // difference, the wrap and the target's error add 12 u of pi.
             let theta1 = theta2 * A2 * REACH / radius.powi(2) + 12.0 * U * PI;
             // Two sums of up to 9 rad, the target's yaw, the wrap.
             let theta4 = theta1 + theta2 + (2.0 * 9.0 + 3.0 * PI) * U;
             let mut actual = found;
             for (joint, bound) in [(0, theta1), (3, theta4)] {
-                // At the seam either end of (-pi, pi] will do.
+                // At the seam either end of (-pi, pi] is right.
                 let off = turn_between(found[joint].into(), expected[joint]);
                 assert!(
                     off.abs() <= bound,
@@ -67,13 +67,13 @@ fn inverse_kinematics() {
                 );
                 actual[joint] = expected[joint] as f32;
             }
-            // What is left in theta1 and theta4 is their rounding.
+            // The remaining error of theta1 and theta4 is their rounding.
             let bound = Vector4::new(U * PI, theta2, 4.0 * U * 0.43, U * PI);
             agree(&row, columns, actual, expected, bound);
 
             let reached = forward(&IRB_930.geometry, &found);
             let gap = (f64::from(reached.x) - x).hypot(f64::from(reached.y) - y);
-            // Radius, and a shoulder angle and a forward computation on top.
+            // Radius, plus a shoulder angle and a forward computation.
             let bound = slack + (12.0 * PI + 8.0 * PI + 2.0 * POSITION) * U * REACH;
             assert!(
                 gap <= bound,

@@ -1,9 +1,9 @@
 //! The controller's f32 mathematics against the reference tables.
 //!
 //! No tolerance is chosen. A bound is a number of roundings times u = 2^-24 times the magnitudes that are summed:
-//! the roundings of the computation, as the firmware documents them, and those of turning the table's f64 inputs and the model's
-//! decimals into f32. The latter move an angle by u of itself, so that a sine or cosine of it moves by as much, a speed
-//! by u of itself, its square by 2 u, and a product of up to three model parameters by 3 u.
+//! the roundings of the computation, as documented in the firmware, and those of converting the table's f64 inputs and
+//! the model's decimals to f32. The latter have a relative error of u in an angle, and its sine or cosine moves by as
+//! much, u in a speed, 2 u in its square, and 3 u in a product of up to three model parameters.
 
 mod dynamics;
 mod inverse;
@@ -35,7 +35,7 @@ const A1: f64 = 0.56;
 const A2: f64 = 0.49;
 const REACH: f64 = A1 + A2;
 
-/// Position, speeds and accelerations of a row, as the table has them and as the controller gets them.
+/// Position, speeds and accelerations of a row, as in the table and as the controller gets them.
 struct State {
     wide: [Vector4<f64>; 3],
     narrow: [Vector4<f32>; 3],
@@ -55,7 +55,7 @@ impl State {
         }
     }
 
-    /// What rounding the angles does to a sine or cosine of any sum of them, in u.
+    /// Effect of rounding the angles on a sine or cosine of any sum of them, in u.
     fn angles(&self) -> f64 {
         let [q, ..] = &self.wide;
         q.x.abs() + q.y.abs() + q.w.abs()
@@ -107,7 +107,7 @@ fn built_in_arm_is_the_reference_arm() {
         let value = json.pointer(path).unwrap_or_else(|| panic!("no {path}"));
         value
             .as_f64()
-            .unwrap_or_else(|| panic!("{path} is no number")) as f32
+            .unwrap_or_else(|| panic!("{path} is not a number")) as f32
     };
     let joint = |path: &str| Vector4::from_fn(|i, _| number(&format!("{path}/{i}")));
     let vector = |path: &str| Vector3::from_fn(|i, _| number(&format!("{path}/{i}")));

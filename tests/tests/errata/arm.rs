@@ -1,4 +1,4 @@
-//! The arm in f64, the states of the reference tables, and how an erratum is reported.
+//! The arm in f64, the states of the reference tables, and the report of an erratum.
 
 use std::fs;
 
@@ -45,8 +45,8 @@ impl Link {
     }
 }
 
-/// The arm of the reference tables, in f64 and from their own model file, so that rounding the controller's constants to
-/// f32 cannot pass for a property of a formula.
+/// The arm of the reference tables, in f64 and from their own model file, so that rounding the controller's constants
+/// to f32 cannot be mistaken for a property of a formula.
 #[derive(Clone, Copy)]
 pub(crate) struct Arm {
     pub a1: f64,
@@ -64,7 +64,7 @@ impl Arm {
         Self::from_json(&model())
     }
 
-    /// The arm as the `payload` column of `dynamics.csv` names it: `none` or `p10`.
+    /// The arm with a payload of the `payload` column of `dynamics.csv`: `none` or `p10`.
     pub(crate) fn with_payload(label: &str) -> Self {
         let model = model();
         let mut arm = Self::from_json(&model);
@@ -149,8 +149,8 @@ pub(crate) fn translation(t: &Matrix4<f64>) -> Vector3<f64> {
     t.fixed_view::<3, 1>(0, 3).into_owned()
 }
 
-/// The greater magnitude. Not a number fails the test: `f64::max` would drop it, and a formula that yields none would
-/// pass for exact.
+/// The greater magnitude. NaN fails the test: `f64::max` would drop it, and a formula that yields NaN would pass as
+/// exact.
 fn greater(so_far: f64, value: &f64) -> f64 {
     assert!(!value.is_nan(), "an error is not a number");
     so_far.max(value.abs())

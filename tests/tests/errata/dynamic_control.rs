@@ -14,7 +14,7 @@ use crate::paper::kinematics::{eq_8_to_19, eq_27};
 use crate::paper::newton_euler::inverse_dynamics;
 use crate::product::{self, Dynamics};
 
-/// Mass matrix and C qd + g by the recursion that agrees with Pinocchio.
+/// Mass matrix and C qd + g by the recursion, which agrees with Pinocchio.
 fn equations_of_motion(
     arm: &Arm,
     q: &Vector4<f64>,
@@ -30,7 +30,7 @@ fn equations_of_motion(
     )
 }
 
-/// Moves the arm under `law` from rest at `start` and gives time and position after every millisecond.
+/// Moves the arm under `law` from rest at `start` and returns time and position after every millisecond.
 fn run(
     arm: &Arm,
     start: &Vector4<f64>,
@@ -127,7 +127,7 @@ fn erratum_41_rate_product_is_that_of_the_actual_motion() {
             (q, qd),
             (q, qd),
         );
-        // The bracket subtracts what the motion adds of itself; what does not cancel accelerates the tool.
+        // The bracket subtracts what the motion itself contributes; anything that does not cancel accelerates the tool.
         (
             largest(&(bracket + Vector4::new(expected[0], expected[1], expected[2], expected[5]))),
             largest(&(product::rate_product(&q, &qd).xyz() - expected.fixed_rows::<3>(0))),
@@ -196,11 +196,11 @@ fn erratum_41_and_51_the_task_law_has_linear_error_dynamics() {
             })
         };
 
-        // What Jdot qd leaves over is a centripetal acceleration of the speed at half-way, e0 b / e, on the reach.
+        // The remainder of Jdot qd is a centripetal acceleration of the speed half-way, e0 b / e, at the reach.
         let reach = arm.a1 + arm.a2;
         let distance = offset.xy().norm();
         let centripetal = (distance * BANDWIDTH / 1.0_f64.exp()).powi(2) / reach;
-        // Rounding: torque through M^-1 and J; the inverse of J on everything it is asked for; the state; the method,
+        // Rounding: torque through M^-1 and J; the inverse of J on its whole argument; the state; the method,
         // (b h)^4 / 120 of the way.
         let rounding = bound_over(&corrected, |(t, (q, qd))| {
             let (m, _) = equations_of_motion(&arm, q, qd);
@@ -313,7 +313,7 @@ fn erratum_51_a_yaw_error_is_the_short_way_round() {
     let pairs: Vec<_> = table.rows().zip(table.rows().skip(1)).collect();
     let zero = Vector4::zeros();
     let errors = worst(pairs, |(desired, actual)| {
-        // Oracle: the rotation that is left, from Pinocchio's matrices.
+        // Oracle: the remaining rotation, from Pinocchio's matrices.
         let [(c_d, s_d), (c, s)] = [&desired, &actual].map(|row| (row.f64("R11"), row.f64("R21")));
         let expected = (s_d * c - c_d * s).atan2(c_d * c + s_d * s);
         let pose = |row: &Row| Vector4::w() * row.f64("yaw");

@@ -7,7 +7,7 @@ use crate::arm::{Arm, State, bound_over, largest, verdict, worst};
 use crate::paper::lagrange as paper;
 use crate::product::{self, Dynamics};
 
-/// Rows without payload: the energies of the paper know none.
+/// Rows without payload, which the energies of the paper do not include.
 fn bare(table: &Table) -> impl Iterator<Item = Row<'_>> {
     table.rows_where("payload", "none")
 }
@@ -106,7 +106,7 @@ fn erratum_23_potential_energy_is_m_g_z() {
             largest(&(product.gravity() - expected)),
         )
     });
-    // Theory: the lift feels no weight as printed, and arm 2 hangs on the shoulder.
+    // Theory: as printed the lift feels no weight, and arm 2 loads the shoulder.
     let weight = arm.lifted_mass() * arm.g;
     verdict(
         23,

@@ -50,7 +50,7 @@ fn erratum_11_o4_lies_below_the_arm() {
         let z = row.f64("z");
         (paper::eq_26_o4(&arm, &q).z - z, product::forward(&q).z - z)
     });
-    // Theory: d3 for -d3, 2 d3; the states fill the stroke of 0.3 m.
+    // Theory: d3 for -d3, 2 d3; the states cover the stroke of 0.3 m.
     verdict(
         11,
         "z of o4",
@@ -77,7 +77,7 @@ fn erratum_12_only_the_4x4_task_jacobian_has_an_inverse() {
         let residual4 = task_rows(&j) * product::task_inverse(&q) - Matrix4::identity();
         (largest(&residual), largest(&residual4))
     });
-    // Theory: rank 4 of 6; what is asked of wx and wy is lost whole.
+    // Theory: rank 4 of 6; commands in wx and wy are lost entirely.
     verdict(12, "J J^-1 - I", "", errors, 1.0, bound);
 }
 
@@ -116,7 +116,7 @@ fn erratum_13_singular_block_is_transposed_and_has_a1_for_a2() {
             -product::determinant(&q) - expected,
         )
     });
-    // Theory: -a1^2 s2 for -a1 a2 s2, so a1 (a1 - a2) at right angles; half of it leaves room for where the states lie.
+    // Theory: -a1^2 s2 for -a1 a2 s2, so a1 (a1 - a2) at right angles; half of it allows for the states' positions.
     verdict(
         13,
         "det J_11",
@@ -157,7 +157,7 @@ fn erratum_14_the_four_alphas_are_not_the_twists() {
 fn erratum_15_the_folded_singularity_is_out_of_reach() {
     let arm = Arm::bare();
     let limit = product::upper_limit().y;
-    // Past a right angle sin theta2 falls to the limit, so the least determinant of a folded arm is the one there.
+    // Past a right angle sin theta2 falls towards the limit, so the least determinant of a folded arm is at the limit.
     let least = arm.a1 * arm.a2 * limit.sin();
     let at_limit = product::determinant(&Vector4::new(0.0, limit, 0.0, 0.0));
     verdict(

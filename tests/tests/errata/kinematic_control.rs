@@ -14,7 +14,7 @@ fn erratum_38_joint_law_feeds_back_the_position_error() {
     // A set point, at a distance of 0.1 rad; the same gain for both forms.
     let (lambda, start, end): (f64, f64, f64) = (1.0, 0.1, 10.0);
     let as_printed = |speed: f64| {
-        // qd = qd_d + lambda qdd with qd_d = 0 rules the acceleration.
+        // qd = qd_d + lambda qdd with qd_d = 0 determines the acceleration.
         let f = |_: f64, x: &Vector2<f64>| Vector2::new(x.y, x.y / lambda);
         integrate(Vector2::new(start, speed), end, 1000, f, |_, x| {
             assert_eq!(x.y, paper::kinematic_joint(0.0, lambda, x.y / lambda));
@@ -23,7 +23,7 @@ fn erratum_38_joint_law_feeds_back_the_position_error() {
     let corrected = integrate(start, end, 1000, |_, error| -lambda * error, |_, _| ());
 
     // Theory: printed, the error stays where it is and a speed grows as e^(t / lambda); corrected, the error falls as
-    // e^(-lambda t). 1e-6 is more than the Runge-Kutta method loses, (lambda h)^4 / 120 an e-fold.
+    // e^(-lambda t). 1e-6 is more than the error of the Runge-Kutta method, (lambda h)^4 / 120 per e-fold.
     let decayed = start * (-lambda * end).exp();
     let grown = 0.01 * (end / lambda).exp();
     verdict(
@@ -57,7 +57,7 @@ fn erratum_39_task_law_feeds_back_the_pose_error() {
     let offset = Vector4::new(0.05, -0.02, 0.01, 0.2);
     let reference = |t: f64| pose(&start) + offset + v * t;
 
-    // As printed mud = mud_d + r mudd, which rules the acceleration; from rest.
+    // As printed mud = mud_d + r mudd, which determines the acceleration; from rest.
     let implied = |rate: &Vector4<f64>| (rate - v) / r;
     let f = |_: f64, x: &SVector<f64, 8>| {
         let (_, rate) = split(x);
@@ -86,13 +86,13 @@ fn erratum_39_task_law_feeds_back_the_pose_error() {
         let error = reference(*t) - pose(q);
         (printed, largest(&(error - offset * (-r * t).exp())))
     });
-    // The law sees the pose to the rounding of f32; an inverse that is off by a fraction leaves that fraction of
-    // what it is asked for, over r. Runge-Kutta: (r h)^4 / 120 of the error.
+    // The law sees the pose rounded to f32; a relative error of the inverse leaves that fraction of its argument, over
+    // r. Runge-Kutta: (r h)^4 / 120 of the error.
     let inverse = bound_over(&path, |(_, q)| product::inverse_jacobian_bound(&arm, q));
     let asked = v.lp_norm(1) / r + offset.lp_norm(1);
     let method = (r * end / f64::from(steps)).powi(4) / 120.0 * largest(&offset);
     let bound = product::position_bound(&arm) + inverse * asked + method;
-    // Theory: the printed law keeps the error it starts with, and what is missing of the speed grows as e^(t / r).
+    // Theory: the printed law keeps its initial error, and the missing speed grows as e^(t / r).
     verdict(
         39,
         "pose error against e^(-rt), 1 s",
@@ -118,7 +118,7 @@ fn erratum_50_the_inverse_needs_a_guard_at_the_stretched_arm() {
         let outwards = Vector2::new(row.f64("x"), row.f64("y")).normalize();
         let v = Vector4::new(-speed * outwards.x, -speed * outwards.y, 0.0, 0.0);
         let j = eq_27(&arm, &q);
-        // J^-1 in closed form, so that the result is the law's and not that of an elimination.
+        // J^-1 in closed form, so that the result is due to the law and not to an elimination.
         let determinant = arm.a1 * arm.a2 * q.y.sin();
         let printed = Vector2::new(
             j[(1, 1)] * v.x - j[(0, 1)] * v.y,
@@ -129,8 +129,8 @@ fn erratum_50_the_inverse_needs_a_guard_at_the_stretched_arm() {
             product::joint_speed_damped(&q, &v).xy().norm(),
         )
     });
-    // Theory: stretched, the radius is the reach and falls by det J / reach for a radian of theta2; 1 % for the rows where it
-    // is a little less. The controller promises 1.155 over 3 % of the reach; 64 u for rounding.
+    // Theory: stretched, the radius is the reach and falls by det J / reach per radian of theta2; 1 % for the rows
+    // where it is a little less. The controller guarantees 1.155 over 3 % of the reach; 64 u for rounding.
     let reach = arm.a1 + arm.a2;
     let asked = bound_over(&rows, |row| speed * reach / row.f64("detJ_a"));
     let promised = 1.155 / (0.03 * reach) * speed;

@@ -31,7 +31,7 @@ fn erratum_01_twist_and_length_belong_to_x_i() {
             (product::forward(&q).xyz() - p).norm(),
         )
     });
-    // Read as worded, theta1 moves the flange on a circle of radius a2 about a fixed point: it misses by up to the
+    // Taken literally, theta1 moves the flange on a circle of radius a2 about a fixed point: the error is up to the
     // diameter of that circle and more.
     verdict(
         1,
@@ -78,7 +78,7 @@ fn erratum_02_second_link_transform_is_a_half_turn_not_a_reflection() {
             product::rotation(&q).determinant() - 1.0,
         )
     });
-    // Theory: a rotation has determinant +1, a reflection -1. The chain in f64 loses some 1e-15 of the 2.
+    // Theory: a rotation has determinant +1, a reflection -1. The error of the chain in f64 is some 1e-15 of the 2.
     verdict(
         2,
         "det R - 1",
@@ -130,7 +130,7 @@ fn erratum_04_atan2_takes_the_sine_side_first() {
         let q = row.vector("q");
         (wrap(typed - yaw), wrap(product::forward(&q).w - yaw))
     });
-    // Theory: swapped arguments give pi/2 - yaw, so the error |pi/2 - 2 yaw| runs through all angles.
+    // Theory: swapped arguments give pi/2 - yaw, so the error |pi/2 - 2 yaw| covers all angles.
     verdict(
         4,
         "yaw, arguments typed as printed",
@@ -150,7 +150,7 @@ fn erratum_04_atan2_takes_the_sine_side_first() {
             wrap(solution.x - row.f64("a_q1")),
         )
     });
-    // Theory: both swapped angles turn about, so the printed theta1 is -theta1.
+    // Theory: both swapped angles change sign, so the printed theta1 is -theta1.
     verdict(
         4,
         "theta1, arguments typed as printed",
@@ -210,10 +210,10 @@ fn erratum_07_theta4_needs_a_turn_inside_its_range() {
     let limit = product::upper_limit().w;
     let alpha = paper::ik_alpha(&r, paper::atan2_meant);
     let printed = paper::ik_theta4(q.x, q.y, alpha);
-    // The wrist stands by its upper limit: the nearest turn of all would be the printed one.
+    // The wrist is close to its upper limit: the nearest turn of all would be the printed one.
     let near = Vector4::new(q.x, q.y, q.z, limit - 0.1);
     let corrected = product::inverse(&product::forward(&q), product::Elbow::Positive, &near)
-        .expect("a pose the arm stands in");
+        .expect("a pose within reach");
     println!(
         "erratum 07  theta4: printed {printed:.3} rad, limit {limit:.3} rad, corrected {:.3} rad",
         corrected.w

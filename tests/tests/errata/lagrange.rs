@@ -7,7 +7,7 @@ use crate::arm::{Arm, State, bound_over, largest, verdict, worst};
 use crate::paper::lagrange as paper;
 use crate::product::{self, Dynamics};
 
-/// What eq. 40-43 take from the arm. Table 1 has no a3: the length of link 3 is zero.
+/// Parameters of the arm in eq. 40-43. Table 1 has no a3: the length of link 3 is zero.
 pub(crate) fn given(arm: &Arm) -> paper::Given {
     paper::Given {
         m: [arm.links[0].mass, arm.links[1].mass, arm.links[2].mass],
@@ -16,7 +16,7 @@ pub(crate) fn given(arm: &Arm) -> paper::Given {
     }
 }
 
-/// Eq. 40-43 with the state put in.
+/// Eq. 40-43 evaluated at a state.
 pub(crate) fn as_printed(given: &paper::Given, state: &State) -> Vector4<f64> {
     let rates = state.qd.xy();
     paper::eq_40_to_43(given, &state.q, &rates, &rates)
@@ -55,7 +55,7 @@ fn erratum_24_velocities_stand_where_accelerations_belong() {
             largest(&(product.inverse(&state) - expected)),
         )
     });
-    // Order of the data: torques reach 2000 N m, and none of it depends on acceleration as printed.
+    // Order of magnitude: torques reach 2000 N m, and as printed none of it depends on acceleration.
     verdict(
         24,
         "torque, eq. 40-43",
@@ -105,8 +105,8 @@ fn erratum_25_gravity_does_not_act_on_the_horizontal_joints() {
             largest(&(product.inverse(&rest) - expected).xy()),
         )
     });
-    // Theory: eq. 40 lets 3 a2 m2 g and more rest on the shoulder; where the states lie, one a2 m2 g at least. The
-    // truth is zero, and the controller's has no term to round.
+    // Theory: eq. 40 puts 3 a2 m2 g and more on the shoulder; at these states at least one a2 m2 g. The true value is
+    // zero, and the controller has no term to round.
     verdict(
         25,
         "tau1, tau2 at rest",
@@ -163,7 +163,7 @@ fn erratum_28_the_lift_takes_a_force() {
         product::MASS_ROUNDINGS * weight,
     );
 
-    // Theory: weight does not depend on the length of the arms, a moment is proportional to it.
+    // Theory: weight does not depend on the length of the arms; a moment is proportional to it.
     let longer = paper::Given {
         a: [2.0 * arm.a1, 2.0 * arm.a2, 0.0],
         ..given(&arm)
@@ -204,7 +204,7 @@ fn erratum_29_the_wrist_feels_inertia_and_no_gravity() {
             product.inverse(&rest).w - expected,
         )
     });
-    // Theory: a3 m3 g cos(theta1 + theta2) at rest; nothing in truth.
+    // Theory: a3 m3 g cos(theta1 + theta2) at rest; the true value is zero.
     verdict(
         29,
         "tau4 at rest with an a3 of 0.1 m",
@@ -214,7 +214,7 @@ fn erratum_29_the_wrist_feels_inertia_and_no_gravity() {
         0.0,
     );
 
-    // The equation that takes its place: (I4 + Ip) (thdd4 - thdd1 - thdd2).
+    // The correct equation instead: (I4 + Ip) (thdd4 - thdd1 - thdd2).
     let errors = worst(table.rows_where("payload", "p10"), |row| {
         let state = State::of(&row);
         let expected = row.f64("tau4");
@@ -253,7 +253,7 @@ fn erratum_49_shaft_and_payload_are_missing() {
         );
         let expected: Vector4<f64> = with.vector::<4>("tau") - without.vector::<4>("tau");
         let state = State::of(&with);
-        // Eq. 40-43 have no symbol for it: what they give does not change.
+        // Eq. 40-43 have no symbol for it: their result does not change.
         (
             largest(&expected),
             largest(&(loaded.inverse(&state) - empty.inverse(&state) - expected)),
@@ -261,7 +261,7 @@ fn erratum_49_shaft_and_payload_are_missing() {
     });
     let arm = Arm::with_payload("p10");
     let bound = product::torque_bound_over(&arm, &table, "p10");
-    // Theory: the weight of 10 kg at the least.
+    // Theory: at least the weight of 10 kg.
     verdict(
         49,
         "torque for a payload of 10 kg",

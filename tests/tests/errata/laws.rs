@@ -1,4 +1,4 @@
-//! The controller's laws as the paper writes them: in continuous time, without friction and rotors.
+//! The controller's laws in the form of the paper: in continuous time, without friction and rotors.
 
 use firmware::control::laws::{ControlInput, Gains, Memory, Model, Motion, Selection, Task};
 use firmware::mechanics::arm::{ArmModel, DriveTrain, IRB_930};
@@ -11,7 +11,7 @@ use protocol::messages::{Compensation, Law};
 use crate::arm::{State, U32};
 use crate::product::payload;
 
-/// Links alone, to which the laws of the paper belong.
+/// Links alone, as in the laws of the paper.
 const DRIVE: DriveTrain = DriveTrain {
     rotor_inertia: Vector4::new(0.0, 0.0, 0.0, 0.0),
     viscous: Vector4::new(0.0, 0.0, 0.0, 0.0),
@@ -24,7 +24,7 @@ const ARM: ArmModel = ArmModel {
     ..IRB_930
 };
 
-/// A law with the arm and payload it knows and its gains, critically damped.
+/// A law with its model of arm and payload and its gains, critically damped.
 pub(crate) struct Controller {
     selection: Selection,
     body: Body,
@@ -47,7 +47,7 @@ impl Controller {
         Self { selection, body }
     }
 
-    /// Joint efforts in a state, with the reference as it is now: no delay to make up for.
+    /// Joint efforts in a state, with the present reference: no delay to compensate.
     pub(crate) fn efforts(
         &self,
         reference: &State,
@@ -82,7 +82,7 @@ impl Controller {
     }
 }
 
-/// What rounding position and velocity to f32 does to a critically damped error equation (rad, m): positions up to 7
+/// Effect of rounding position and velocity to f32 on a critically damped error equation (rad, m): positions up to 7
 /// rad, and velocities `speed` over half the bandwidth, for state and reference each.
 pub(crate) fn sensing_bound(speed: f64, bandwidth: f64) -> f64 {
     2.0 * U32 * (7.0 + 2.0 * speed / bandwidth)

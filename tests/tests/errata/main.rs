@@ -1,9 +1,9 @@
 //! The errata of "In-Depth Analysis of Kinematic, Dynamic, and Control Aspects of a 4-Axis SCARA Robot Manipulator",
-//! one test each: the printed formula is wrong by so much, the controller's is right within a derived bound.
+//! one test each: the printed formula is wrong by a stated amount, the controller's is right within a derived bound.
 //!
-//! `docs/errata.md` is the table to read along. `cargo test -p tests --test errata -- --nocapture --test-threads=1` prints the
-//! numbers in it. An oracle is never the controller and never the paper: the tables of Pinocchio, a derivative of positions,
-//! a conservation law, or linear algebra.
+//! `docs/errata.md` has the table of them. `cargo test -p tests --test errata -- --nocapture --test-threads=1` prints
+//! the numbers in it. An oracle is never the controller and never the paper: the tables of Pinocchio, a derivative of
+//! positions, a conservation law, or linear algebra.
 
 mod arm;
 mod dynamic_control;

@@ -31,7 +31,7 @@ fn scale() -> f64 {
     })
 }
 
-/// The roundings of the controller's recursion, in f64, and as many in Pinocchio's.
+/// The roundings of the controller's recursion, in f64, and as many again in Pinocchio's.
 fn f64_bound() -> f64 {
     2.0 * product::RECURSION_ROUNDINGS / U32 * U64 * scale()
 }
@@ -62,13 +62,13 @@ fn the_recursion_without_misprints_agrees_with_pinocchio() {
 fn erratum_31_gravity_has_to_enter_the_recursion() {
     let arm = Arm::with_payload("p10");
     let weight = arm.lifted_mass() * arm.g;
-    // Theory: the weight of lift and payload is missing whole. 1e-9 is for rounding.
+    // Theory: the whole weight of lift and payload is missing. 1e-9 is for rounding.
     assert_wrong_by(31, &[Misprint::NoGravity], weight * (1.0 - 1e-9));
 }
 
 #[test]
 fn erratum_32_coriolis_term_takes_the_rate_of_the_slide() {
-    // A slide on a turntable, the simplest arm in which a prismatic axis is not parallel to the rotation that carries it.
+    // A slide on a turntable, the simplest arm with a prismatic axis not parallel to the rotation that carries it.
     let (r, rd, rdd, w, alpha) = (1.0, 1.0, 3.0, 2.0, 5.0);
     let row = |alpha: f64, d| DhRow {
         a: 0.0,
@@ -109,7 +109,7 @@ fn erratum_32_coriolis_term_takes_the_rate_of_the_slide() {
         240.0 * U64,
     );
 
-    // In a SCARA slide and rotation are parallel, and the misprint cannot be seen.
+    // In a SCARA slide and rotation are parallel, and the misprint has no effect.
     assert!(torque_errors(&[Misprint::Coriolis]).0 <= f64_bound());
 }
 
@@ -122,7 +122,7 @@ fn erratum_33_angular_acceleration_mixes_two_frames() {
 
 #[test]
 fn erratum_34_lever_of_the_centre_of_mass_takes_the_angular_acceleration() {
-    // Theory: m lc qdd is replaced by m w a lc; at 10 rad/s and 10 m/s^2 the two differ by the order of 100 N m.
+    // Theory: m lc qdd is replaced by m w a lc; at 10 rad/s and 10 m/s^2 they differ by about 100 N m.
     assert_wrong_by(34, &[Misprint::ComAcceleration], 100.0);
 }
 
@@ -134,14 +134,14 @@ fn erratum_35_moment_takes_the_inertia_tensor() {
 
 #[test]
 fn erratum_36_force_is_carried_over_once() {
-    // Theory: the horizontal force of shaft and payload, some 12 kg at 10 m/s^2 and more on a lever of 0.5 m, comes
-    // turned by theta4.
+    // Theory: the horizontal force of shaft and payload, some 12 kg at 10 m/s^2 and more on a lever of 0.5 m, is
+    // rotated by theta4.
     assert_wrong_by(36, &[Misprint::ForceFrame], 10.0);
 }
 
 #[test]
 fn erratum_37_effort_acts_along_the_axis_of_the_frame_before() {
-    // Theory: moments about the far end of a link leave out its whole lever.
+    // Theory: moments about the far end of a link omit its whole lever.
     assert_wrong_by(37, &[Misprint::DistalMoment], 100.0);
 }
 

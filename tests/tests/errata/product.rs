@@ -1,4 +1,4 @@
-//! The controller's side of every comparison: its functions taken to f64, and how far f32 lets them be off.
+//! The controller's side of every comparison: its functions converted to f64, and their errors due to f32.
 //!
 //! u is the unit roundoff of f32, 2^-24. The bounds count roundings to first order (Higham 2002, chapter 3) on top of the
 //! errors that the controller documents for its own functions. They are for states inside the joint limits, whose angles
@@ -23,17 +23,17 @@ const GEOMETRY: &Geometry = &IRB_930.geometry;
 /// of angles, 17.2 u of summing the angles of the yaw or 8 u of products, 6.3 u of wrapping.
 pub(crate) const ANGLE_BOUND: f64 = 48.0 * U32;
 
-/// Error of a coordinate of the flange or an element of the Jacobian (m): angles off as above, times the reach.
+/// Error of a coordinate of the flange or an element of the Jacobian (m): angle errors as above, times the reach.
 pub(crate) fn position_bound(arm: &Arm) -> f64 {
     ANGLE_BOUND * (arm.a1 + arm.a2)
 }
 
-/// Relative error of an element of the mass matrix that holds no angle: rounded constants and their sums.
+/// Relative error of an element of the mass matrix without angles: rounded constants and their sums.
 pub(crate) const MASS_ROUNDINGS: f64 = 8.0 * U32;
 
-/// Rounding of the recursive Newton-Euler algorithm, as a fraction of the sum of magnitudes that goes through it: 15 u for
-/// inputs, and for each of four frames 6 u to carry a vector outwards, 6 u for the acceleration of the next origin, and 10 u
-/// to carry force and moment back and add them up, and 6 u for the inertial force of a link.
+/// Rounding of the recursive Newton-Euler algorithm, as a fraction of the sum of magnitudes in it: 15 u for inputs; for
+/// each of four frames 6 u to transform a vector outwards, 6 u for the acceleration of the next origin, and 10 u to
+/// transform force and moment back and add them up; and 6 u for the inertial force of a link.
 pub(crate) const RECURSION_ROUNDINGS: f64 = 128.0 * U32;
 
 fn f32s(v: &Vector4<f64>) -> Vector4<f32> {
@@ -98,7 +98,7 @@ pub(crate) fn reason_fits(refusal: &IkError, reason: &str) -> bool {
         "joint1_limit" => Axis::Shoulder,
         "joint2_limit" => Axis::Elbow,
         "z_high" | "z_low" => Axis::Lift,
-        other => panic!("ik.csv has a new reason {other}"),
+        other => panic!("ik.csv has an unknown reason {other}"),
     };
     matches!(refusal, IkError::Limit { axis, .. } if *axis == expected)
 }
@@ -241,7 +241,7 @@ pub(crate) fn newton_euler(label: &str, state: &State) -> Vector4<f64> {
     newton_euler::inverse(&IRB_930, &payload(label), &f32s(q), &f32s(qd), &f32s(qdd)).cast()
 }
 
-/// Inertia of arm 1, arm 2 and tool about their axes with what hangs on them, and the coupling of the two arms (kg m^2):
+/// Inertia of arm 1, arm 2 and tool about their axes with their loads, and the coupling of the two arms (kg m^2):
 /// `A`, `B`, `G` and `h` of an arm whose shaft and payload are balanced about axis 4.
 fn lumps(arm: &Arm) -> [f64; 4] {
     let [arm1, arm2, carriage, shaft] = &arm.links;
@@ -268,7 +268,7 @@ fn magnitudes(arm: &Arm, state: &State) -> Vector4<f64> {
     Vector4::new(f1 + f2 + f4, f2 + f4, lifted * (qdd.z + arm.g), f4)
 }
 
-/// Error of the closed-form torques: 32 u of the magnitudes by the controller's own account for exact
+/// Error of the closed-form torques: 32 u of the magnitudes as documented by the controller for exact
 /// inputs, 9.5 u for angles of up to 2.5 + 7.0 rad rounded, 3 u for rounded rates and accelerations.
 pub(crate) fn torque_bounds(arm: &Arm, state: &State) -> Vector4<f64> {
     magnitudes(arm, state) * (48.0 * U32)
@@ -285,15 +285,14 @@ pub(crate) fn torque_bound_over(arm: &Arm, table: &Table, label: &str) -> f64 {
     bound_over(rows, |row| torque_bound(arm, &State::of(&row)))
 }
 
-/// The same of the wrist alone, largest over the rows with one payload.
+/// The same for the wrist alone, largest over the rows with one payload.
 pub(crate) fn wrist_bound(arm: &Arm, table: &Table, label: &str) -> f64 {
     let rows = table.rows_where("payload", label);
     48.0 * U32 * bound_over(rows, |row| magnitudes(arm, &State::of(&row)).w)
 }
 
-/// Sum of magnitudes that goes through the Newton-Euler recursion: for every link its inertial force on the whole lever
-/// back to the base, with distances added up where the recursion goes out to the far end of a link and back to its centre of
-/// mass.
+/// Sum of magnitudes in the Newton-Euler recursion: for every link its inertial force times the whole lever back to the
+/// base, with distances added where the recursion goes out to the far end of a link and back to its centre of mass.
 pub(crate) fn recursion_scale(arm: &Arm, state: &State) -> f64 {
     let (qd, qdd) = (state.qd.abs(), state.qdd.abs());
     let turning = |joints: usize| {
@@ -318,7 +317,7 @@ pub(crate) fn recursion_scale(arm: &Arm, state: &State) -> f64 {
     sum
 }
 
-/// What rotors and friction add to the joint efforts.
+/// Contribution of rotors and friction to the joint efforts.
 pub(crate) fn drive_efforts(state: &State) -> Vector4<f64> {
     let drive = Drive::new(&IRB_930.drive);
     let efforts = drive.rotor_inertia() * f32s(&state.qdd) + drive.friction(&f32s(&state.qd));

@@ -1,4 +1,4 @@
-//! Errata 26, 30, 47 and 48: eq. 40-43 against what every Lagrangian system obeys.
+//! Errata 26, 30, 47 and 48: eq. 40-43 against laws that every Lagrangian system obeys.
 
 use nalgebra::{Matrix4, Vector2, Vector4};
 
@@ -34,8 +34,8 @@ fn erratum_26_nothing_depends_on_theta1() {
             largest(&(product.inverse(&turned) - product.inverse(&state))),
         )
     });
-    // Theory: theta1 is cyclic, turning the whole arm changes nothing. As printed, gravity on the shoulder alone swings by
-    // more than a2 m2 g.
+    // Theory: theta1 is cyclic, so turning the whole arm changes nothing. As printed, gravity on the shoulder alone
+    // varies by more than a2 m2 g.
     let wrong_by = arm.a2 * arm.links[1].mass * arm.g;
     verdict(
         26,
@@ -111,8 +111,8 @@ fn erratum_47_gravity_as_printed_has_no_potential() {
             curl(&|s| product.inverse(s), &q),
         )
     });
-    // Theory: a gradient has no curl; as printed, a closed path of shoulder and elbow gains energy every time round. The
-    // terms a1 m1 g sin theta1 and a2 m2 g sin(theta1 + theta2) are left over.
+    // Theory: a gradient has no curl; as printed, a closed path of shoulder and elbow gains energy on every round. The
+    // terms a1 m1 g sin theta1 and a2 m2 g sin(theta1 + theta2) remain.
     let wrong_by = arm.a2 * arm.links[1].mass * arm.g;
     verdict(
         47,

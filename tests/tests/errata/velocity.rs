@@ -17,7 +17,7 @@ fn frame(arm: &Arm, q: &Vector4<f64>, i: usize) -> (Matrix3<f64>, Vector3<f64>) 
     (rotation(&t), translation(&t))
 }
 
-/// Velocity of frame `i` in its own axes: the derivative of where it is.
+/// Velocity of frame `i` in its own axes: the derivative of its pose.
 fn differentiated(arm: &Arm, q: &Vector4<f64>, qd: &Vector4<f64>, i: usize) -> Twist {
     let (r, _) = frame(arm, q, i);
     let (r_before, o_before) = frame(arm, &(q - qd * STEP), i);
@@ -68,7 +68,7 @@ fn erratum_16_the_joint_turns_about_the_axis_of_the_frame_before() {
             largest(&(r * corrected[3].angular - angular(&row))),
         )
     });
-    // Theory: joint 2 counts with the wrong sign, 2 theta2-dot; the elbow runs at up to 12 rad/s.
+    // Theory: joint 2 counts with the wrong sign, 2 theta2-dot; the elbow turns at up to 12 rad/s.
     verdict(
         16,
         "angular velocity of the flange, eq. 30",
@@ -98,7 +98,7 @@ fn erratum_17_the_lever_turns_with_the_joint() {
             largest(&(r * corrected[3].linear - linear(&row))),
         )
     });
-    // Theory: a1 theta1-dot is missing whole (7.7 rad/s x 0.56 m at full speed) among other things.
+    // Theory: a1 theta1-dot is missing entirely (7.7 rad/s x 0.56 m at full speed), among other things.
     verdict(
         17,
         "linear velocity of the flange, eq. 32, 33",
@@ -197,6 +197,6 @@ fn erratum_45_eq_39_contradicts_eq_35() {
             largest(&(r * own - product::flange_velocity(&q, &qd).0)),
         )
     });
-    // Theory: the sign of y is turned, 2 a2 theta1-dot cos(theta1 + theta2).
+    // Theory: the sign of y is reversed, 2 a2 theta1-dot cos(theta1 + theta2).
     verdict(45, "R04 V44 - V04", "m/s", errors, 2.0, bound(&arm, w));
 }

@@ -2,23 +2,23 @@
 //!
 //! ```text
 //! <!-- from: COMMAND -->
-//! what it prints, in a fence or as it is
+//! its output, in a fence or as plain text
 //! <!-- end -->
 //! ```
 //!
-//! `from` wants every character. `about` is for figures that the compiler has a say in, such as instructions: words are
-//! the same, numbers within 10 %, or 16 where that is more, as in `tests/board/budget.py`.
+//! `from` compares every character. `about` is for figures that depend on the compiler, such as instructions: words
+//! must be the same, numbers within 10 %, or 16 where that is more, as in `tests/board/budget.py`.
 
 use crate::Problem;
 use crate::commands::Programs;
 use crate::markdown::Document;
 
-/// How far a number of an `about` block may be off, of itself.
+/// Relative tolerance of a number in an `about` block.
 const TOLERANCE: f64 = 0.1;
-/// How far a small one may be off.
+/// Absolute tolerance of a small one.
 const SLACK: f64 = 16.0;
 
-/// Runs the command of each block and compares, or with `update` replaces what is in it.
+/// Runs the command of each block and compares its content with the output, or with `update` replaces it.
 pub(crate) fn check(document: &mut Document, programs: &Programs, update: bool) -> Vec<Problem> {
     let mut problems = Vec::new();
     let mut from = 0;
@@ -44,7 +44,10 @@ pub(crate) fn check(document: &mut Document, programs: &Programs, update: bool) 
                         let command = &block.command;
                         problems.push(Problem::new(
                             start + 1,
-                            format!("not what `{command}` prints; docs --update replaces it\n{difference}"),
+                            format!(
+                                "differs from the output of `{command}`; docs --update replaces it\
+{difference}"
+                            ),
                         ));
                     }
                 }
@@ -94,7 +97,7 @@ impl Block {
     }
 }
 
-/// The lines that differ, `-` in the document and `+` printed; those that are missing at the end as well.
+/// The lines that differ, `-` in the document and `+` printed, including those missing at the end.
 fn difference(old: &[String], new: &[String], exact: bool) -> Option<String> {
     let same = |old: &String, new: &String| if exact { old == new } else { near(old, new) };
     let mut lines = Vec::new();
@@ -110,7 +113,7 @@ fn difference(old: &[String], new: &[String], exact: bool) -> Option<String> {
     (!lines.is_empty()).then(|| lines.join("\n"))
 }
 
-/// The same words, and numbers that are close.
+/// Whether words are the same and numbers close.
 fn near(old: &str, new: &str) -> bool {
     let mut old = old.split_whitespace();
     let mut new = new.split_whitespace();

@@ -1,4 +1,4 @@
-//! Commands in documents: every subcommand, option and cargo target they name is there.
+//! Commands in documents: every subcommand, option and cargo target that they name exists.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -11,21 +11,22 @@ use serde_json::Value;
 use crate::Problem;
 use crate::markdown::Document;
 
-/// Our programs and the targets of the workspace.
+/// The project's programs and the targets of the workspace.
 pub(crate) struct Programs {
     root: PathBuf,
-    /// Where our programs are, before the other folders of `PATH`.
+    /// The folder of these programs, followed by the other folders of `PATH`.
     path: String,
-    /// Packages and, of each, names of its targets.
+    /// Packages, each with the names of its targets.
     targets: HashMap<String, Vec<String>>,
-    /// Help by command, since documents name the same ones again and again.
+    /// Help by command, since documents repeat the same ones.
     help: RefCell<HashMap<String, Result<String, String>>>,
 }
 
 impl Programs {
     /// Those beside this program, built for release.
     pub(crate) fn new(root: &Path) -> Result<Self, String> {
-        let this = env::current_exe().map_err(|error| format!("where am I? {error}"))?;
+        let this = env::current_exe()
+            .map_err(|error| format!("cannot find the path of this program: {error}"))?;
         // target/release/docs, or a test of it in target/debug/deps.
         let built = this
             .ancestors()
@@ -55,7 +56,7 @@ impl Programs {
         Ok(programs)
     }
 
-    /// What the command prints.
+    /// Output of the command.
     pub(crate) fn output(&self, command: &str) -> Result<String, String> {
         let output = Command::new("bash")
             .args(["-o", "pipefail", "-c", command])
@@ -67,7 +68,8 @@ impl Programs {
             let said = String::from_utf8_lossy(&output.stderr);
             return Err(format!("`{command}` failed, {}\n{said}", output.status));
         }
-        String::from_utf8(output.stdout).map_err(|_| format!("`{command}` prints no UTF-8"))
+        String::from_utf8(output.stdout)
+            .map_err(|_| format!("the output of `{command}` is not UTF-8"))
     }
 
     fn help_of(&self, command: &str) -> Result<String, String> {
@@ -78,7 +80,7 @@ impl Programs {
             .clone()
     }
 
-    /// What is wrong with a command, if it is one of those that are checked.
+    /// The problem with a command, if it is one of those that are checked.
     fn fault(&self, command: &str) -> Option<String> {
         let words: Vec<&str> = command
             .split_whitespace()
@@ -104,7 +106,7 @@ impl Programs {
             .copied()
             .collect();
         let help = match self.help_of(&[&[program], &subcommands[..]].concat().join(" ")) {
-            // What follows may be an argument: then the help is that of the command before.
+            // The last word may be an argument: then the help is that of the command without it.
             Err(_) if subcommands.len() > 1 => {
                 self.help_of(&[&[program], &subcommands[..1]].concat().join(" "))
             }
@@ -122,7 +124,7 @@ impl Programs {
                     .split(|c: char| !(c.is_ascii_alphanumeric() || c == '-'))
                     .any(|word| word == *option)
             })
-            .map(|option| format!("{program} has no option {option} there"))
+            .map(|option| format!("{program} has no such option: {option}"))
     }
 
     fn fault_in_targets(&self, arguments: &[&str]) -> Option<String> {
@@ -149,7 +151,7 @@ impl Programs {
     }
 }
 
-/// Commands of the document, in shell fences and in backquotes, that name what is not there.
+/// Commands of the document, in shell fences and in backquotes, that name something missing.
 pub(crate) fn check(document: &Document, programs: &Programs) -> Vec<Problem> {
     let shell = document
         .lines()

@@ -1,11 +1,12 @@
-//! Keeps the documents true: what they show of a program's output, the commands they give, the files they point at.
+//! Keeps the documents correct: the program output that they show, the commands that they give, the files that they
+//! link.
 //!
 //! ```text
 //! cargo run --release -p tests --bin docs -- [--update] [FILE...]
 //! ```
 //!
 //! Without files it takes every Markdown file at the root and in `docs`. Programs are those in `target/release`: build
-//! them first. `tests/ci/40-docs.sh` does all of it.
+//! them first. `tests/ci/40-docs.sh` does all of this.
 
 mod blocks;
 mod commands;
@@ -18,10 +19,10 @@ use std::{env, fs};
 
 use markdown::Document;
 
-/// Something in a document that does not hold.
+/// A problem in a document.
 #[derive(Debug)]
 struct Problem {
-    /// Line it is on, from 1.
+    /// Its line, from 1.
     line: usize,
     /// What is wrong, and what to do about it.
     text: String,
@@ -62,7 +63,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The number of problems in the files, all of them printed.
+/// Prints all problems in the files and returns their number.
 fn check(files: &[PathBuf], update: bool) -> Result<usize, String> {
     let root = root();
     let files = if files.is_empty() {

@@ -1,16 +1,16 @@
-//! The little of Markdown that the checks need.
+//! The part of Markdown that the checks need.
 
 /// A document by lines.
 pub(crate) struct Document {
     lines: Vec<String>,
 }
 
-/// A line of a document, and whether it is inside of a fence.
+/// A line of a document, and whether it is inside a fence.
 pub(crate) struct Line<'a> {
     /// From 1.
     pub(crate) number: usize,
     pub(crate) text: &'a str,
-    /// What the fence around it is of, such as `sh`; the fence's own lines are left out.
+    /// Language of the fence around it, such as `sh`; the fence's own lines are left out.
     pub(crate) fence: Option<&'a str>,
 }
 
@@ -51,7 +51,7 @@ impl Document {
             })
     }
 
-    /// Text between backquotes, with the number of its first line. A span ends with its paragraph at the latest.
+    /// Text between backquotes, with the number of its first line. A span ends at the latest with its paragraph.
     pub(crate) fn code_spans(&self) -> Vec<(usize, String)> {
         let mut spans = Vec::new();
         let mut open: Option<(usize, String)> = None;
@@ -100,7 +100,7 @@ impl Document {
     }
 }
 
-/// Lower case; blanks become hyphens, and what is neither letter, digit, hyphen nor underscore goes.
+/// Lower case; blanks become hyphens, and anything but letters, digits, hyphens and underscores is removed.
 fn slug(heading: &str) -> String {
     heading
         .to_lowercase()

@@ -1,4 +1,4 @@
-//! Links and paths in documents: each leads to something.
+//! Links and paths in documents: each must exist.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::Problem;
 use crate::markdown::Document;
 
-/// Folders whose names begin the paths that are checked when they stand in backquotes.
+/// Prefixes of the paths in backquotes that are checked.
 const FOLDERS: [&str; 5] = ["docs/", "firmware/", "plant-sim/", "protocol/", "tests/"];
 
 /// Links of the document at `path`, and paths from `root` in backquotes, that lead nowhere.
@@ -14,7 +14,7 @@ pub(crate) fn check(document: &Document, path: &Path, root: &Path) -> Vec<Proble
     let folder = path.parent().unwrap_or(root);
     let links = document.links().filter_map(|(line, target)| {
         let found = link_leads_somewhere(target, document, folder);
-        (!found).then(|| Problem::new(line, format!("link to '{target}', which is not there")))
+        (!found).then(|| Problem::new(line, format!("link to '{target}', which does not exist")))
     });
     let paths = document
         .code_spans()
@@ -23,7 +23,7 @@ pub(crate) fn check(document: &Document, path: &Path, root: &Path) -> Vec<Proble
             let word = span.split_whitespace().next()?;
             let is_path = FOLDERS.iter().any(|folder| word.starts_with(folder));
             (is_path && !exists(root, word))
-                .then(|| Problem::new(line, format!("'{word}' is no file or folder")))
+                .then(|| Problem::new(line, format!("'{word}' is not a file or folder")))
         });
     links.chain(paths).collect()
 }
@@ -43,7 +43,7 @@ fn link_leads_somewhere(target: &str, document: &Document, folder: &Path) -> boo
     fs::read_to_string(file).is_ok_and(|text| Document::new(&text).has_anchor(anchor))
 }
 
-/// Whether there is such a file. A star in the last part of the path stands for anything.
+/// Whether there is such a file. A star in the last part of the path matches anything.
 fn exists(root: &Path, path: &str) -> bool {
     let Some((before, after)) = path.split_once('*') else {
         return root.join(path).exists();

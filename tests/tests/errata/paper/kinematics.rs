@@ -53,8 +53,8 @@ pub(crate) fn eq_2(row: &DhRow) -> Matrix4<f64> {
     )
 }
 
-/// The link transform as the sentence before eq. 1 words it: twist `alpha_i` and length `a_i` about and along `x_{i-1}`,
-/// then angle and offset about and along z.
+/// The link transform according to the sentence before eq. 1: twist `alpha_i` and length `a_i` about and along
+/// `x_{i-1}`, then angle and offset about and along z.
 pub(crate) fn text_before_eq_1(row: &DhRow) -> Matrix4<f64> {
     let twist = eq_2(&DhRow {
         d: 0.0,
@@ -121,13 +121,13 @@ pub(crate) fn eq_8_to_19(arm: &Arm, q: &Vector4<f64>) -> (Matrix3<f64>, Vector3<
     (rotation, position)
 }
 
-/// `atan2` with the arguments in the order in which a programming language takes them: `atan2(first, second)` of the
-/// paper typed as it stands, so the first is the sine side.
+/// `atan2` with the arguments in the order of programming languages: `atan2(first, second)` of the paper typed
+/// literally, so the first is the sine side.
 pub(crate) fn atan2_typed(first: f64, second: f64) -> f64 {
     first.atan2(second)
 }
 
-/// `atan2` with the arguments as the paper (after Spong) means them: cosine side first.
+/// `atan2` with the arguments as meant by the paper (after Spong): cosine side first.
 pub(crate) fn atan2_meant(first: f64, second: f64) -> f64 {
     second.atan2(first)
 }
@@ -156,7 +156,7 @@ pub(crate) fn ik_theta1(arm: &Arm, o: &Vector2<f64>, theta2: f64, atan2: Atan2) 
     atan2(o.x, o.y) - atan2(arm.a1 + arm.a2 * c2, arm.a2 * s2)
 }
 
-/// Inverse kinematics: `theta4 = theta1 + theta2 - alpha`, with no word on wrapping.
+/// Inverse kinematics: `theta4 = theta1 + theta2 - alpha`, without wrapping.
 pub(crate) fn ik_theta4(theta1: f64, theta2: f64, alpha: f64) -> f64 {
     theta1 + theta2 - alpha
 }
@@ -216,7 +216,7 @@ pub(crate) fn eq_27(arm: &Arm, q: &Vector4<f64>) -> SMatrix<f64, 6, 4> {
     ])
 }
 
-/// Eq. 29: the block J_11 that is to decide on singularities.
+/// Eq. 29: the block J_11 that is supposed to determine singularities.
 pub(crate) fn eq_29(arm: &Arm, q: &Vector4<f64>) -> Matrix3<f64> {
     let (s1, c1) = q.x.sin_cos();
     let (s12, c12) = (q.x + q.y).sin_cos();

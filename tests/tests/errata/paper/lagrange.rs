@@ -2,8 +2,8 @@
 
 use nalgebra::{Vector2, Vector4};
 
-/// What eq. 40-43 take as given. `m` and `a` are the masses and lengths of links 1 to 3: the equations know no link 4,
-/// no inertia and no payload, but a length `a3` that Table 1 sets to zero.
+/// Parameters of eq. 40-43. `m` and `a` are the masses and lengths of links 1 to 3: the equations have no link 4, no
+/// inertia and no payload, but a length `a3` that Table 1 sets to zero.
 pub(crate) struct Given {
     pub m: [f64; 3],
     pub a: [f64; 3],
@@ -23,8 +23,8 @@ pub(crate) fn potential_energy(bodies: impl IntoIterator<Item = (f64, f64)>, g: 
     bodies.into_iter().map(|(m, y)| m * g * y).sum()
 }
 
-/// Eq. 40-43: tau_1 to tau_4. `rate` stands for the theta-dots that occur to the first power and `square` for those that
-/// occur in products; as printed both are the joint velocities.
+/// Eq. 40-43: tau_1 to tau_4. `rate` is the theta-dots that occur to the first power and `square` those that occur in
+/// products; as printed both are the joint velocities.
 pub(crate) fn eq_40_to_43(
     given: &Given,
     q: &Vector4<f64>,
@@ -127,7 +127,8 @@ pub(crate) fn eq_42(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64
                 + a1 * v1 * c12)
 }
 
-/// Eq. 43: tau_4. The print breaks off inside the last cosine, "cos(theta_1 + theta"; theta_2 is read for the rest.
+/// Eq. 43: tau_4. The printed formula breaks off inside the last cosine, "cos(theta_1 + theta"; the rest is
+/// read as theta_2.
 pub(crate) fn eq_43(given: &Given, q: &Vector4<f64>, rate: &Vector2<f64>) -> f64 {
     let ([_, _, m3], [a1, a2, a3], g) = (given.m, given.a, given.g);
     let (c2, c12) = (q.y.cos(), (q.x + q.y).cos());

@@ -1,7 +1,7 @@
-//! The formulas of the paper exactly as they stand in print, wrong or right, with their equation numbers.
+//! The formulas of the paper exactly as printed, wrong or right, with their equation numbers.
 //!
-//! Paper: "In-Depth Analysis of Kinematic, Dynamic, and Control Aspects of a 4-Axis SCARA Robot Manipulator". Nothing here may be
-//! repaired: a defect that disappears from this module takes the meaning out of the test that shows it.
+//! Paper: "In-Depth Analysis of Kinematic, Dynamic, and Control Aspects of a 4-Axis SCARA Robot Manipulator". Nothing
+//! here may be corrected: without the defect in this module, the test that shows it is meaningless.
 
 pub(crate) mod control;
 pub(crate) mod kinematics;

@@ -1,7 +1,7 @@
-//! Eq. 44-48 and the unnumbered lines between them: the Newton-Euler recursion, with each of its misprints on a switch.
+//! Eq. 44-48 and the unnumbered lines between them: the Newton-Euler recursion, with each of its misprints selectable.
 //!
-//! With no misprint it is the recursion for standard DH frames (Luh, Walker, Paul 1980); with one misprint only that line
-//! is the paper's, which shows what the line alone is worth; with all of them it is the paper's recursion.
+//! With no misprint it is the recursion for standard DH frames (Luh, Walker, Paul 1980); with one misprint only that
+//! line is the paper's, which shows the effect of that line; with all of them it is the paper's recursion.
 
 use nalgebra::{Matrix3, Vector3, Vector4};
 
@@ -108,7 +108,7 @@ pub(crate) fn inverse_dynamics(arm: &Arm, state: &State, misprints: &[Misprint])
     let rows = table_1(arm, &state.q);
     let mut motion = Motion::default();
     if !wrong(Misprint::NoGravity) {
-        // A base that accelerates upwards loads the arm as its weight does (Featherstone 2008, section 5.3).
+        // A base accelerating upwards loads the arm like its weight (Featherstone 2008, section 5.3).
         motion.a = Vector3::z() * arm.g;
     }
     let motions: [Motion; 4] = std::array::from_fn(|i| {
@@ -128,7 +128,7 @@ pub(crate) fn inverse_dynamics(arm: &Arm, state: &State, misprints: &[Misprint])
     for i in (0..4).rev() {
         let link = &arm.links[i];
         let (inertia_force, inertia_moment) = inertial(link, &motions[i], misprints);
-        // Rotation and origin of the next frame in this one; nothing hangs on the flange.
+        // Rotation and origin of the next frame in this one; there is no load at the flange.
         let (r_next, p_next) = match transforms.get(i + 1) {
             Some(t) => (rotation(t), translation(t)),
             None => (Matrix3::identity(), Vector3::zeros()),
@@ -163,7 +163,7 @@ pub(crate) fn inverse_dynamics(arm: &Arm, state: &State, misprints: &[Misprint])
     tau
 }
 
-/// Force F and moment N that the motion of a link takes.
+/// Force F and moment N for the motion of a link.
 fn inertial(link: &Link, motion: &Motion, misprints: &[Misprint]) -> (Vector3<f64>, Vector3<f64>) {
     let wrong = |m| misprints.contains(&m);
     let Motion { w, alpha, a } = *motion;
