@@ -8,7 +8,7 @@
 #   - ends the jobs it has started when it ends.
 #
 # need, need_python, need_browser, need_vcan and need_cross install what a check depends on (root on Debian) or say what is missing.
-# build_host builds our own programs.
+# build_host builds the project's programs.
 
 set -Eeuo pipefail
 shopt -s inherit_errexit

@@ -46,7 +46,7 @@ enum Command {
     Timing(timing::TimingArgs),
     /// Compare two runs on one page.
     Report(report::ReportArgs),
-    /// Look into a recorded trace.
+    /// Inspect a recorded trace.
     #[command(subcommand)]
     Trace(trace::TraceCommand),
     /// Watch a bus: identifiers, rates, values, load, states and faults.

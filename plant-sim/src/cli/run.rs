@@ -253,7 +253,7 @@ fn keep_report(
     output::write(&path, &page).map_err(|error| error.to_string())
 }
 
-/// Writes what the controller has logged. A log that is lost takes nothing away from the run.
+/// Writes the controller's log. A lost log does not invalidate the run.
 fn keep_log(controller: &mut Qemu, path: &Path) {
     let written = controller
         .take_log()
