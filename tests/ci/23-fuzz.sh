@@ -45,18 +45,18 @@ fi
 while read -r name runs; do
     search "$name" -seed=1 -runs="$runs"
 done <<'TARGETS'
-arguments 100000
-asc 5000
-board 20000
-candump 5000
-dbc 50000
-frame 100000
-gains 1000
-judges 500
-model 1000
-node 1000
-payload 20000
-pcapng 5000
-scenario 2000
-slcan 20000
+arguments 1000000
+asc 50000
+board 500000
+candump 20000
+dbc 500000
+frame 500000
+gains 20000
+judges 5000
+model 20000
+node 10000
+payload 200000
+pcapng 20000
+scenario 20000
+slcan 500000
 TARGETS
