@@ -19,7 +19,7 @@ pub use view::{Page, View};
 const WINDOW_US: u64 = 1_000_000;
 /// Events kept.
 const EVENTS: usize = 1000;
-/// The same event again within this time is one, us.
+/// Repetitions of an event within this time count as one, us.
 const REPEATED_US: u64 = 100_000;
 
 /// Gathers the data to show.
@@ -39,7 +39,7 @@ pub struct Monitor {
     events: VecDeque<Event>,
 }
 
-/// Something a person wants to know of although it is over.
+/// A past event that remains of interest.
 #[derive(Clone)]
 struct Event {
     time_us: u64,

@@ -1,7 +1,7 @@
-//! A bus recorded into files: whole lines at any moment, a new file by size, and nothing that was there is replaced.
+//! A bus recorded into files: whole lines at any moment, a new file by size, and no existing file is replaced.
 //!
-//! A file grows as `NAME.part` and takes its name when it is complete, so that what has its name is whole, and what a crash
-//! leaves is there to be read.
+//! A file grows as `NAME.part` and takes its name when it is complete, so that a file with its name is complete, and
+//! the rest after a crash can still be read.
 
 use std::cell::Cell;
 use std::fs::{self, File, OpenOptions};
@@ -12,27 +12,27 @@ use std::rc::Rc;
 use trace::convert::{Converter, Target};
 use trace::{Entry, Record};
 
-/// Why nothing is recorded, or no more.
+/// Why nothing, or nothing more, is recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The name asks for a format that is not written.
+    /// The name is for a format that is not supported.
     #[error(
         "{} ends in {extension}; record writes candump logs (.log or any other name), Vector ASC (.asc) and pcapng (.pcapng)",
         path.display()
     )]
     Format {
-        /// Name asked for.
+        /// Requested name.
         path: PathBuf,
-        /// Its end.
+        /// Its extension.
         extension: String,
     },
-    /// A device, a pipe, a folder or a link is there.
-    #[error("{} is no regular file; record makes a new one: name another", .0.display())]
+    /// A device, a pipe, a folder or a link has this name.
+    #[error("{} is not a regular file; record creates a new one: name another", .0.display())]
     NoFile(PathBuf),
-    /// A recording is there.
+    /// A recording has this name.
     #[error("{} exists, and a recording is never replaced; name another file or move it away", .0.display())]
     Exists(PathBuf),
-    /// A file under construction is there.
+    /// A file under construction has this name.
     #[error(
         "{} exists: it is being recorded, or left by a recording that was killed; its lines are whole, move it away",
         .0.display()
@@ -53,15 +53,15 @@ pub enum RecordError {
 pub struct Recorded {
     /// Frames.
     pub frames: u64,
-    /// What the CAN controller reported.
+    /// Error frames reported by the CAN controller.
     pub error_frames: u64,
     /// Bytes.
     pub bytes: u64,
-    /// Files, the one that grows included.
+    /// Files, including the growing one.
     pub files: u32,
 }
 
-/// Writes records into a file, or into several one after the other.
+/// Writes records into a file, or into several one after another.
 pub struct Recording {
     name: PathBuf,
     target: Target,
@@ -119,7 +119,7 @@ impl Recording {
         Ok(())
     }
 
-    /// Lets readers of the file see what there is.
+    /// Flushes the file, so that its readers see everything so far.
     ///
     /// # Errors
     /// It cannot be written.
@@ -130,7 +130,7 @@ impl Recording {
         }
     }
 
-    /// What has been recorded so far.
+    /// Counts so far.
     #[must_use]
     pub fn recorded(&self) -> Recorded {
         self.recorded
@@ -145,7 +145,7 @@ impl Recording {
         Ok(self.recorded)
     }
 
-    /// The file that grows; the next, if the one before is complete.
+    /// The growing file; the next one if the previous is complete.
     fn part(&mut self) -> Result<&mut Part, RecordError> {
         let part = match self.part.take() {
             Some(part) => part,
@@ -204,7 +204,7 @@ impl Part {
         growing(&self.path)
     }
 
-    /// On the disk before it has its name.
+    /// Syncs the file to disk before it takes its name.
     fn complete(self) -> Result<(), RecordError> {
         let growing = self.growing();
         let write = |converter: Converter<Counted>| converter.finish()?.file.get_ref().sync_all();
@@ -228,7 +228,7 @@ fn target(name: &Path) -> Result<Target, RecordError> {
     }
 }
 
-/// Only an empty file may be there, as mktemp leaves one.
+/// Only an empty file may exist, as left by mktemp.
 fn refuse_taken(path: &Path) -> Result<(), RecordError> {
     match fs::symlink_metadata(path) {
         Ok(data) if !data.is_file() => Err(RecordError::NoFile(path.into())),
@@ -263,7 +263,7 @@ fn failed(path: &Path) -> impl Fn(io::Error) -> RecordError {
     }
 }
 
-/// A file that counts what is written to it. The count is shared, since the file is inside of a converter.
+/// A file that counts what is written to it. The count is shared, since the file is inside a converter.
 struct Counted {
     file: BufWriter<File>,
     bytes: Rc<Cell<u64>>,

@@ -1,7 +1,8 @@
-//! Pages about runs: one file that draws by itself, on its own, without asking any other place for anything.
+//! Pages about runs: one self-contained file that loads nothing from anywhere.
 //!
-//! The sources are in `plant-sim/pages`: plain modules that are joined in their order and share one scope, a style sheet, and
-//! the library that draws curves. A page carries its runs as JSON; a page about two runs is made from the pages of each.
+//! The sources are in `plant-sim/pages`: plain modules that are concatenated in order and share one scope, a style
+//! sheet, and the library that draws curves. A page carries its runs as JSON; a page about two runs is made from the
+//! pages of each.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -19,7 +20,7 @@ use crate::run::Results;
 /// Name of a run's page in the folder of its results.
 pub const FILE: &str = "report.html";
 
-/// What every page is made of, in this order.
+/// Parts of every page, in this order.
 const SHARED: [&str; 8] = [
     include_str!("../pages/vendor/uplot/uPlot.iife.min.js"),
     include_str!("../pages/page.js"),
@@ -36,24 +37,24 @@ const STYLE: &str = concat!(
     include_str!("../pages/style.css"),
 );
 
-/// Where the runs are in a page about runs.
+/// Place of the runs in a page about runs.
 const RUNS: [&str; 2] = [
     r#"<script type="application/json" id="runs">["#,
     "]</script>",
 ];
 
-/// What a page says of a run.
+/// Content of a page about a run.
 #[derive(Serialize)]
 struct About<'a> {
     results: Value,
     drawing: &'a Drawing,
 }
 
-/// The page about a run that came to `results`.
+/// The page about a run with `results`.
 pub fn page(results: &Results, drawing: &Drawing) -> String {
     let name = &results.summary.recipe.scenario;
     let mut results = serde_json::to_value(results).expect("numbers and texts are JSON");
-    // As long as the run, and drawn besides.
+    // As long as the run, and drawn anyway.
     if let Some(members) = results.as_object_mut() {
         members.remove("each_cycle");
     }

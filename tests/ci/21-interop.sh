@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Our traces in the hands of others, and theirs in ours: can-utils, python-can, tshark. Our dissector in the hands of tshark
+# Our traces in other tools and theirs in ours: can-utils, python-can, tshark. Our dissector in the hands of tshark
 # shows what we decode.
 source "$(dirname "$0")/lib.bash"
 need log2asc can-utils

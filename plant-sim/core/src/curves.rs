@@ -1,4 +1,4 @@
-//! What a page draws of a run: curves, poses and cycles, gathered while it goes in bounded memory.
+//! Data that a page draws of a run: curves, poses and cycles, gathered during the run in bounded memory.
 
 mod thinned;
 
@@ -21,9 +21,9 @@ use crate::world::CellEvent;
 
 use thinned::Thinned;
 
-/// Names of the curves. Of joints: actual position (rad, m), reference minus actual, effort (N m, N); of the tool: distance from
-/// where the reference has it (m); of the bus: share of the time that it was taken, and time from a sample to the arrival of
-/// its command (s); and the code of the controller's state.
+/// Names of the curves. Of joints: actual position (rad, m), reference minus actual, effort (N m, N); of the tool:
+/// distance from its reference (m); of the bus: share of the time for which it was busy, and time from a sample to the
+/// arrival of its command (s); and the code of the controller's state.
 const CURVES: [&str; 16] = [
     "q1",
     "q2",
@@ -60,19 +60,19 @@ pub struct Curves {
     stride: u64,
     samples: u64,
     cycles: Vec<f64>,
-    /// Time that the bus was taken since the last sample, ns.
+    /// Time for which the bus was busy since the last sample, ns.
     busy: u64,
     command: Option<Instant>,
 }
 
-/// What a page draws. Curves are little-endian f32 in base64.
+/// Data that a page draws. Curves are little-endian f32 in base64.
 #[derive(Clone, Debug, Serialize)]
 pub struct Drawing {
     /// Time between two samples, s.
     step_s: f64,
     /// Samples in all.
     samples: u64,
-    /// Samples that a value of a curve stands for; where more than one, each two are the extremes of their span in their order.
+    /// Samples per value of a curve; if more than one, each pair of values is the extremes of its span in their order.
     samples_per_value: u64,
     /// By name.
     curves: serde_json::Map<String, serde_json::Value>,
@@ -80,7 +80,7 @@ pub struct Drawing {
     samples_per_pose: u64,
     /// Joint positions, four actual ones and the four of the reference for each pose.
     poses: String,
-    /// When cycles began, s.
+    /// Start times of cycles, s.
     cycles: Vec<f64>,
     /// Names of the controller's states by their codes.
     modes: Vec<(u8, &'static str)>,
@@ -119,7 +119,7 @@ impl From<&RobotModel> for Robot {
 }
 
 impl Curves {
-    /// Nothing yet, for this run.
+    /// Empty curves for this run.
     pub fn new(config: &RunConfig) -> Self {
         Self {
             arm: Arm::new(&config.actual, None),
@@ -135,7 +135,7 @@ impl Curves {
         }
     }
 
-    /// What there is to draw.
+    /// The data to draw.
     pub fn finish(self, config: &RunConfig) -> Drawing {
         let curves = CURVES.into_iter().zip(&self.curves);
         Drawing {

@@ -70,8 +70,8 @@ struct Balance {
 }
 
 impl Plant {
-    /// Longest step of integration, ns: what is left of a millisecond after the command has arrived. The fastest thing it
-    /// must resolve is a joint on its end stop (400 rad/s): three tenths of a radian a step. Only a robot with extremely
+    /// Longest step of integration, ns: the rest of a millisecond after the command has arrived. The fastest motion to
+    /// resolve is a joint on its end stop (400 rad/s): three tenths of a radian per step. Only a robot with extremely
     /// steep friction gets shorter steps.
     pub const MAX_STEP_NS: u64 = 750_000;
 
@@ -139,7 +139,7 @@ impl Plant {
         self.saturated
     }
 
-    /// Which motors give all they can now. A request as close to the limit as single precision can say is one for all.
+    /// Which motors are at their limit now. A command at the limit to single precision counts as being at it.
     pub fn at_limit(&self) -> [bool; 4] {
         let speed = self.drive.to_motor(&self.qd);
         std::array::from_fn(|i| {
@@ -194,7 +194,7 @@ impl Plant {
         }
     }
 
-    /// Shorter where a brake slides: it stops within one step, and half of that step is how far it may err.
+    /// Shorter while a brake slides: it stops within one step, and its error is up to half of that step.
     fn longest_step(&self) -> u64 {
         if self.brake.is_closed() && !self.brake.is_sticking() {
             self.max_step.min(Self::BRAKING_STEP_NS)
@@ -261,7 +261,7 @@ impl Plant {
         mass
     }
 
-    /// Efforts without that on the lift while the brake holds it.
+    /// Efforts, without the one on the lift while the brake holds it.
     fn free(&self, mut effort: Vector4<f64>) -> Vector4<f64> {
         if self.brake.is_sticking() {
             effort[LIFT] = 0.0;
@@ -373,7 +373,7 @@ impl Plant {
         self.drive.joint_effort(&self.motor_torque().into()).into()
     }
 
-    /// The rigid arm with what it holds.
+    /// The rigid arm with its payload.
     pub fn arm(&self) -> &Arm {
         &self.arm
     }

@@ -1,4 +1,4 @@
-//! What a page draws is what the run was.
+//! The drawn data agree with the run.
 
 use std::io;
 
@@ -28,7 +28,7 @@ fn gate(cycles: u32, rate_hz: f64) -> RunConfig {
     RunConfig::new(scenario)
 }
 
-/// What is drawn of a run, and what it was.
+/// The data drawn of a run, and its truth.
 fn run(config: &RunConfig) -> (Value, Vec<Truth>, f64) {
     let mut observers = (Curves::new(config), Truths::default());
     let summary = in_process(config, &mut observers).unwrap();

@@ -1,4 +1,4 @@
-//! What comes over a bus, as a record of a trace.
+//! Frames received from a bus, as records of a trace.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -19,7 +19,7 @@ pub(super) fn record(arrival: &Arrival, interface: Interface) -> Option<Record> 
     })
 }
 
-/// Since 1970.
+/// Microseconds since 1970.
 pub(super) fn microseconds(time: SystemTime) -> u64 {
     time.duration_since(UNIX_EPOCH)
         .map_or(0, |since| since.as_micros() as u64)

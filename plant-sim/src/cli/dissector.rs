@@ -12,7 +12,7 @@ use super::show;
 /// Arguments of `dissector`.
 #[derive(Args)]
 pub(super) struct DissectorArgs {
-    /// Write to this file instead of standard output, as ~/.local/lib/wireshark/plugins/scara.lua.
+    /// Write to this file instead of standard output, such as ~/.local/lib/wireshark/plugins/scara.lua.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }

@@ -59,7 +59,7 @@ enum Command {
     Dbc(dbc::DbcArgs),
     /// Write the messages of the link as a dissector for Wireshark (Lua).
     Dissector(dissector::DissectorArgs),
-    /// Write a robot as an external controller takes it (controller --model).
+    /// Write a robot for an external controller (controller --model).
     Model(model::ModelArgs),
 }
 

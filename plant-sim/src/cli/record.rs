@@ -11,11 +11,11 @@ use trace::Interface;
 
 use super::{arrival, show, signal};
 
-/// Longest wait for a frame before signals are looked at; also the time between two flushes.
+/// Longest wait for a frame before checking for signals; also the time between two flushes.
 const WAIT: Duration = Duration::from_millis(100);
 /// Frames taken before flush and signals get their turn.
 const BATCH: usize = 4096;
-/// Longest time after the signal in which what has come is taken.
+/// Longest time after the signal for taking the frames already received.
 const LAST: Duration = Duration::from_secs(1);
 
 /// Arguments of `record`.
@@ -28,12 +28,12 @@ pub(super) struct RecordArgs {
     /// grows it is called FILE.part.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Begin a new file when one has this size (64M): FILE-0001.log, FILE-0002.log and so on.
+    /// Begin a new file when one reaches this size (64M): FILE-0001.log, FILE-0002.log and so on.
     #[arg(long, value_name = "SIZE", value_parser = size)]
     rotate: Option<u64>,
 }
 
-/// Records until a signal comes.
+/// Records until a signal arrives.
 pub(super) fn run(args: &RecordArgs) -> Result<ExitCode, String> {
     let failed = |error: RecordError| error.to_string();
     let mut recording = Recording::create(&args.out, args.rotate).map_err(failed)?;
@@ -45,7 +45,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<ExitCode, String> {
             eprintln!("plant-sim: recording {}; Ctrl-C ends it", args.bus);
             record(&mut link, &args.bus, &mut recording)
         });
-    // Whatever ended it, what was recorded gets its name.
+    // However it ended, the recording gets its name.
     let recorded = recording.finish().map_err(failed)?;
     let lost = ended?;
     show(&format!(
@@ -65,7 +65,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<ExitCode, String> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Records until a signal comes or the bus is gone; gives the number of frames lost.
+/// Records until a signal arrives or the bus is gone; returns the number of frames lost.
 fn record(link: &mut Link, bus: &LinkAddress, recording: &mut Recording) -> Result<u64, String> {
     let interface = interface(bus);
     let mut flushed = Instant::now();
@@ -78,13 +78,13 @@ fn record(link: &mut Link, bus: &LinkAddress, recording: &mut Recording) -> Resu
             flushed = Instant::now();
         }
     }
-    // What has come by now belongs to the recording; a bus that is never quiet must not hold it up.
+    // Frames received so far belong to the recording; a bus that is never quiet must not delay the end.
     let ended = Instant::now();
     while take(link, interface, recording)? > 0 && ended.elapsed() < LAST {}
     Ok(link.lost())
 }
 
-/// Records what there is, a batch at most; gives its number of frames.
+/// Records the available frames, a batch at most; returns their number.
 fn take(link: &mut Link, interface: Interface, recording: &mut Recording) -> Result<usize, String> {
     for taken in 0..BATCH {
         let Some(arrival) = link.next_arrival() else {
@@ -99,7 +99,7 @@ fn take(link: &mut Link, interface: Interface, recording: &mut Recording) -> Res
     Ok(BATCH)
 }
 
-/// The name that the bus has in the recording.
+/// The name of the bus in the recording.
 fn interface(bus: &LinkAddress) -> Interface {
     match bus {
         LinkAddress::SocketCan(name) => Interface::new(name).unwrap_or(Interface::CAN0),

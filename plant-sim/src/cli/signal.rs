@@ -1,12 +1,12 @@
-//! Signals that ask a subcommand to end with what it has: Ctrl-C, SIGTERM, SIGHUP.
+//! Signals that end a subcommand with its results so far: Ctrl-C, SIGTERM, SIGHUP.
 
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Exit code of a process that its second Ctrl-C ended.
+/// Exit code of a process ended by a second Ctrl-C.
 const INTERRUPTED: i32 = 130;
 
-/// Whether a signal has asked for the end.
+/// Whether a signal has requested the end.
 static STOP: AtomicBool = AtomicBool::new(false);
 
 /// From now on the first signal is for [`has_come`]; a second one ends the process.
@@ -16,10 +16,10 @@ pub(super) fn end_on_signal() -> Result<(), String> {
             process::exit(INTERRUPTED);
         }
     })
-    .map_err(|error| format!("cannot take signals: {error}"))
+    .map_err(|error| format!("cannot handle signals: {error}"))
 }
 
-/// Whether the subcommand is to end.
+/// Whether the subcommand has to end.
 pub(super) fn has_come() -> bool {
     STOP.load(Ordering::Relaxed)
 }

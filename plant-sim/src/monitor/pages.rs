@@ -1,4 +1,4 @@
-//! What the pages of the monitor say, line by line, for a terminal of any width.
+//! Text of the monitor's pages, line by line, for a terminal of any width.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::view::{ALARM, BOLD, GREY};
 use trace::decode::describe;
 use trace::stats::{IdStatistics, Statistics};
 
-/// Blanks between two parts of a line, and before a line that goes on.
+/// Blanks between two parts of a line, and before a continued line.
 const GAP: &str = "  ";
 
 /// Title of the page of identifiers.
@@ -22,7 +22,7 @@ pub(super) fn bus_header() -> Line<'static> {
     Line::styled(text, BOLD)
 }
 
-/// One identifier a line: how it came in the last second, and what has been wrong since the start.
+/// One identifier per line: timing in the last second, and errors since the start.
 pub(super) fn bus(picture: &Picture) -> Vec<Line<'static>> {
     let recent: BTreeMap<&str, &IdStatistics> = picture
         .window
@@ -65,7 +65,7 @@ pub(super) fn bus(picture: &Picture) -> Vec<Line<'static>> {
         .collect()
 }
 
-/// Identifiers of the one bus that is watched.
+/// Identifiers of the watched bus.
 fn ids(statistics: &Statistics) -> impl Iterator<Item = &IdStatistics> {
     statistics.interfaces.iter().flat_map(|bus| &bus.ids)
 }
@@ -94,7 +94,7 @@ pub(super) fn values(picture: &Picture, width: usize) -> Vec<Line<'static>> {
     lines
 }
 
-/// What has happened, the newest first.
+/// Events, the newest first.
 pub(super) fn events(picture: &Picture, width: usize) -> Vec<Line<'static>> {
     let started = picture.started_us.unwrap_or(0);
     let mut lines = Vec::new();

@@ -225,7 +225,7 @@ class Monitor:
         before = sockets("vcan0")
         pid, self.terminal = pty.fork()
         if pid == 0:
-            # The size is asked for once, at the start.
+            # The size is read once, at the start.
             fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
             os.environ["TERM"] = "xterm-256color"
             os.execv(PLANT_SIM, [PLANT_SIM, "monitor", "--bus", "socketcan:vcan0"])

@@ -5,13 +5,13 @@ const MOST: usize = 12_288;
 
 /// One value for every sample, and once there are too many, least and greatest of every few samples instead.
 ///
-/// Values lie in pairs, the pair of a span of `2 * samples_per_value` samples. A span of two samples keeps both; a longer one
+/// Values are in pairs, one per span of `2 * samples_per_value` samples. A span of two samples keeps both; a longer one
 /// keeps its extremes in the order in which they came. Either way the values are drawn from left to right, no peak is lost,
 /// and a curve that is short enough is complete.
 #[derive(Clone, Debug)]
 pub(super) struct Thinned {
     pairs: Vec<[f32; 2]>,
-    /// The span that has begun, and of how many samples.
+    /// The current span, and its number of samples so far.
     open: [f32; 2],
     filled: u64,
     /// Samples of a whole span.
@@ -28,7 +28,7 @@ impl Thinned {
         }
     }
 
-    /// Samples that a value stands for.
+    /// Samples per value.
     pub(super) const fn samples_per_value(&self) -> u64 {
         self.span / 2
     }
@@ -56,7 +56,7 @@ impl Thinned {
         self.span *= 2;
     }
 
-    /// The values so far, the span that has begun included.
+    /// The values so far, including those of the current span.
     pub(super) fn values(&self) -> impl Iterator<Item = f32> {
         let open = (self.filled > 0).then_some(self.open);
         self.pairs.iter().copied().chain(open).flatten()
@@ -104,7 +104,7 @@ mod tests {
             .collect();
         let curve = of(values.iter().copied());
         assert_eq!(curve.samples_per_value(), 1);
-        // The span that has begun is open at its end.
+        // The current span is open at its end.
         let kept: Vec<f32> = curve.values().take(values.len()).collect();
         assert_eq!(kept, values);
     }

@@ -1,12 +1,13 @@
 //! The rigid chain: recursive Newton-Euler and composite-rigid-body algorithms (Featherstone 2008, tables 5.1 and 6.2),
 //! for links only; rotors and friction are in [`super::drive`].
 //!
-//! All axes of a SCARA are parallel. Its links therefore move in horizontal planes, apart from the lift, which no turn
-//! reaches: three planar bodies turn (upper arm, forearm with the sleeve of the shaft, shaft with payload), and the
-//! shaft's mass goes up and down by itself. Of the bodies' inertias only the moments about the vertical matter.
+//! All axes of a SCARA are parallel. Its links therefore move in horizontal planes, apart from the lift, which is
+//! independent of the rotations: three planar bodies turn (upper arm, forearm with the sleeve of the shaft, shaft with
+//! payload), and the shaft's mass moves up and down separately. Only the bodies' moments of inertia about the vertical
+//! matter.
 //!
 //! The controller's dynamics come from Lagrange's equations and from Denavit-Hartenberg frames. This derivation shares no
-//! formula with them, so that the plant can contradict the controller. The tests hold it against the same algorithms in
+//! formula with them, so that the plant can contradict the controller. The tests compare it with the same algorithms in
 //! six dimensions, which know nothing of a SCARA.
 
 use super::planar::{Force, Inertia, Motion, Transform};
@@ -18,9 +19,9 @@ use nalgebra::{Matrix4, Vector4};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
     pub(super) geometry: Geometry,
-    /// Bodies that turn, each about its own joint, in axes that are those of frame 0 at joint position zero.
+    /// Turning bodies, each about its own joint, in axes that are those of frame 0 at joint position zero.
     bodies: [Inertia; 3],
-    /// What the lift carries, kg.
+    /// Mass carried by the lift, kg.
     lifted: f64,
     /// Heights of all centres of mass above frame 0 with the lift at zero, times their masses, kg m.
     first_moment: f64,
@@ -28,7 +29,7 @@ pub struct Arm {
     gravity: f64,
 }
 
-/// Which way the wrist turns, seen from above: its axis points down.
+/// Direction of the wrist's rotation seen from above: its axis points down.
 pub(super) const WRIST: f64 = -1.0;
 
 /// The arm at one set of joint positions, so that trigonometry is done once.
@@ -143,7 +144,8 @@ impl Arm {
         let shaft = self.bodies[2];
         let forearm = self.bodies[1] + at.wrist.inertia_back(&shaft);
         let upper_arm = self.bodies[0] + at.elbow.inertia_back(&forearm);
-        // The force that gives each composite body a unit acceleration about its joint, felt at the joints before it.
+        // The force that gives each composite body a unit acceleration about its joint, projected on the joints before
+        // it.
         let at_wrist = shaft.apply(&turn);
         let at_elbow = at.wrist.force_back(&at_wrist);
         let (m44, m42) = (at_wrist.moment, WRIST * at_elbow.moment);

@@ -1,4 +1,4 @@
-//! The account of energy.
+//! The energy balance.
 
 use super::Plant;
 
@@ -21,7 +21,7 @@ pub struct Energy {
 }
 
 impl Plant {
-    /// The account of energy.
+    /// The energy balance.
     pub fn energy(&self) -> Energy {
         let at = self.arm.at(&self.q);
         let rotors = 0.5 * self.qd.dot(&(self.drive.rotor_inertia() * self.qd));

@@ -46,17 +46,17 @@ const WEIGHTS: [f64; 4] = [
 /// Rates of the quantities integrated along with the motion: four motor torques, motor power, lost power.
 pub(super) type Rates = SVector<f64, 6>;
 
-/// What a state does to the joints.
+/// Effect of a state on the joints.
 pub(super) struct Slope {
     /// Mass matrix at the beginning of the step, times the acceleration.
     pub(super) force: Vector4<f64>,
-    /// Rates of what is integrated along.
+    /// Rates of the quantities integrated along.
     pub(super) rates: Rates,
 }
 
 /// Advances `q` and `qd` by `h` seconds and returns the integrals of the rates.
 ///
-/// `mass`, `damping` and `first` are those at the beginning of the step; `slope` is asked for the later stages.
+/// `mass`, `damping` and `first` are those at the beginning of the step; `slope` is called for the later stages.
 pub(super) fn step(
     q: &mut Vector4<f64>,
     qd: &mut Vector4<f64>,

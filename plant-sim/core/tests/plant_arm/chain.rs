@@ -1,4 +1,4 @@
-//! The same algorithms in six dimensions: a witness that knows nothing of a SCARA but its list of joints.
+//! The same algorithms in six dimensions: a check that knows nothing of a SCARA but its list of joints.
 //!
 //! Recursive Newton-Euler and composite rigid bodies in spatial form (Featherstone 2008, tables 5.1 and 6.2).
 
@@ -6,7 +6,7 @@ use super::spatial::{Force, Inertia, Motion, Transform};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use sim::model::{Payload, RobotModel};
 
-/// A serial chain of four rigid links with one joint each, and what is held at its flange.
+/// A serial chain of four rigid links with one joint each, and the payload at its flange.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Chain {
     /// From the parent link's frame to the joint's frame at joint position zero.

@@ -16,7 +16,7 @@ use trace::{Problem, ReadError, Reader, Record};
 
 use crate::cli::signal;
 
-/// Unreadable lines that are shown; of more, only the number is.
+/// Unreadable lines that are shown; of further ones only the number is.
 const SHOWN: u64 = 10;
 /// Records between two checks of the clock.
 const LOOK: u64 = 1 << 14;
