@@ -48,11 +48,11 @@ class Board {
 
     motion() {
         const [top, side, path] = this.scenes;
-        const factors = [1, 10, 100, 1000].map((factor) => element("option", { value: factor }, `deviation × ${factor}`));
+        const factors = [1, 10, 100, 1000].map((factor) => element("option", { value: factor }, `× ${factor}`));
         this.factor = element("select", { "aria-label": "Magnification of the deviation", change: () => this.magnify(+this.factor.value) }, ...factors);
         const figure = (scene, ...caption) =>
             element("figure", { class: "scene" }, element("figcaption", {}, ...caption), scene.view.canvas);
-        const key = element("span", { class: "readout" }, element("span", { class: "key key-reference" }, "reference"), element("span", { class: "key key-actual" }, "actual"));
+        const key = element("span", { class: "readout" }, element("span", { class: "key key-reference" }, "reference"), element("span", { class: "key key-actual" }, "deviation"));
         return element("div", { class: "row three" }, figure(top, element("b", {}, "From above")), figure(side, element("b", {}, "From the side")), figure(path, element("b", {}, "Tool path"), " ", key, this.factor));
     }
 

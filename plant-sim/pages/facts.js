@@ -32,7 +32,7 @@ function title(run, number, all) {
     const { results } = run;
     const key = all.length > 1 ? element("span", { class: `key key-${RUN_COLOURS[number]}` }, "AB"[number]) : null;
     const verdict = results.completed ? element("span", { class: "good" }, "completed") : element("span", { class: "bad" }, `not completed: ${results.error}`);
-    return element("p", { class: "title" }, key, `${all.length > 1 ? ` ${results.scenario}: ` : ""}${results.law}, ${results.payload_kg} kg, ${results.rate_hz} Hz, ${results.cycles} cycles – `, verdict);
+    return element("p", { class: "title" }, key, `${all.length > 1 ? ` ${results.scenario}: ` : ""}${results.law}, ${results.payload_kg} kg, ${results.rate_hz} Hz, ${results.cycles} ${results.cycles === 1 ? "cycle" : "cycles"} – `, verdict);
 }
 
 /** The facts, a column for each run; those in which they differ stand out. */

@@ -119,15 +119,31 @@ fn of_runs(title: &str, runs: &[String]) -> String {
         title,
         &format!("{begin}{runs}{end}"),
         &script.join("\n"),
-        "",
+        [""; 2],
     )
 }
 
-/// A page that may do nothing but run its own script in its own style.
-fn html(title: &str, data: &str, script: &str, rights: &str) -> String {
+/// The page that runs the simulation: `module` is the crate `web` as WebAssembly.
+pub fn what_if(module: &[u8]) -> String {
+    let module = BASE64_STANDARD.encode(module);
+    let data = format!(r#"<script type="text/plain" id="module">{module}</script>"#);
+    let own = [
+        include_str!("../pages/simulation.js"),
+        include_str!("../pages/what-if.js"),
+    ];
+    let script = [&SHARED[..], &own].concat().join("\n");
+    // The module is compiled in the page, and runs in a thread that is made from a text of the page.
+    let rights = [" 'wasm-unsafe-eval'", "; worker-src blob:"];
+    html("What if", &data, &script, rights)
+}
+
+/// A page that may do nothing but run its own script in its own style, and what the `rights` allow: more scripts, and the
+/// rest.
+fn html(title: &str, data: &str, script: &str, rights: [&str; 2]) -> String {
     let hash = |text: &str| format!("'sha256-{}'", BASE64_STANDARD.encode(Sha256::digest(text)));
+    let [scripts, rest] = rights;
     let policy = format!(
-        "default-src 'none'; script-src {}{rights}; style-src {}; base-uri 'none'; form-action 'none'",
+        "default-src 'none'; script-src {}{scripts}; style-src {}{rest}; base-uri 'none'; form-action 'none'",
         hash(script),
         hash(STYLE)
     );

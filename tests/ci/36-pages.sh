@@ -36,3 +36,11 @@ run without --no-report
 [ ! -e "$work/without/report.html" ] || fail "--no-report leaves a report"
 refused "report.html: cannot be read" "$plant_sim" report "$work/gate" "$work/without"
 node tests/pages/report.mjs "$work/gate" "$work/failed" "$work/compare.html" "$pictures"
+
+echo "- the page that runs the simulation"
+need_cross wasm32-unknown-unknown
+plant-sim/web/build "$work/what-if.html" >/dev/null
+size=$(stat -c %s "$work/what-if.html")
+[ "$size" -lt 1500000 ] || fail "what-if.html has $size bytes"
+refused "not a WebAssembly module" "$plant_sim" what-if "$work/gate/trace.log" --out "$work/none.html"
+node tests/pages/what-if.mjs "$work/what-if.html" "$(realpath "$plant_sim")" "$pictures"

@@ -39,15 +39,20 @@ export async function withBrowser(use) {
         });
         page.on("pageerror", (error) => complaints.push(`${file}: ${error.stack}`));
         page.on("request", (request) => {
-            if (request.url().split("#")[0] !== own) {
+            // A blob is a part of the page.
+            if (request.url().split("#")[0] !== own && !request.url().startsWith("blob:")) {
                 complaints.push(`${file} asks for ${request.url()}`);
             }
         });
         await page.goto(own + hash);
+        page.setDefaultTimeout(10_000);
         return page;
     };
     try {
         await use(open);
+    } catch (error) {
+        // What a page complains of is often why.
+        complaints.unshift(error.stack);
     } finally {
         await browser.close();
     }

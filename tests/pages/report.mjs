@@ -97,7 +97,7 @@ async function buttonsAct(page) {
         check(unlike(was, await pixels(page, chart)) > 20, `${name} changes nothing`);
     }
     const path = await pixels(page, "The path of the tool, reference and actual");
-    await page.getByLabel("Magnification of the deviation").selectOption({ label: "deviation × 1" });
+    await page.getByLabel("Magnification of the deviation").selectOption({ label: "× 1" });
     check(unlike(path, await pixels(page, "The path of the tool, reference and actual")) > 20, "the deviation is not magnified");
 }
 

@@ -15,6 +15,7 @@ mod run;
 mod signal;
 mod timing;
 mod trace;
+mod what_if;
 
 use std::io::{self, Write as _};
 use std::process::ExitCode;
@@ -46,6 +47,8 @@ enum Command {
     Timing(timing::TimingArgs),
     /// Compare two runs on one page.
     Report(report::ReportArgs),
+    /// Write the page that runs the simulation in a browser.
+    WhatIf(what_if::WhatIfArgs),
     /// Inspect a recorded trace.
     #[command(subcommand)]
     Trace(trace::TraceCommand),
@@ -74,6 +77,7 @@ pub(crate) fn main() -> Result<ExitCode, String> {
         Some(Command::Eval(args)) => eval::run(&args),
         Some(Command::Timing(args)) => timing::run(&args),
         Some(Command::Report(args)) => report::run(&args),
+        Some(Command::WhatIf(args)) => what_if::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),
         Some(Command::Monitor(args)) => monitor::run(&args),
         Some(Command::Record(args)) => record::run(&args),

@@ -11,7 +11,7 @@
 //! new Uint8Array(memory.buffer, place, request.length).set(request);
 //! const status = run();
 //! const text = (which) => new TextDecoder().decode(new Uint8Array(memory.buffer, output(which), output_len(which)));
-//! const trace = text(0), truth = text(1), summary = text(2), error = text(3);
+//! const trace = text(0), truth = text(1), summary = text(2), error = text(3), drawing = text(4);
 //! ```
 //!
 //! The trace equals the `trace.log`, the truth the `truth.csv` of `plant-sim run`, to the byte. The memory of a run is
@@ -19,12 +19,14 @@
 
 use std::cell::RefCell;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use sim::curves::Curves;
 use sim::record::{TraceLog, TruthLog};
 use sim::run::in_process;
 use sim::scenario::{MAX_CYCLES, Scenario, check_rate};
 use sim::selection::LawChoice;
 use sim::setup::RunConfig;
+use sim::summary::Summary;
 
 /// A requested run.
 #[derive(Debug, Deserialize)]
@@ -45,6 +47,15 @@ struct Results {
     trace: Vec<u8>,
     truth: Vec<u8>,
     summary: Vec<u8>,
+    drawing: Vec<u8>,
+}
+
+/// The summary, with what `summary.json` says of the trace.
+#[derive(Serialize)]
+struct Summarised {
+    #[serde(flatten)]
+    summary: Summary,
+    trace_sha256: String,
 }
 
 /// Executes a request. A scenario that could not be completed also has results; its summary says why.
@@ -70,21 +81,29 @@ fn answer(request: &[u8]) -> Result<Results, String> {
 
     let unwritten = |error: std::io::Error| error.to_string();
     let truth = TruthLog::new(Vec::new()).map_err(unwritten)?;
-    let mut observers = (TraceLog::new(Vec::new()), truth);
-    let summary = in_process(&RunConfig::new(scenario), &mut observers)
-        .map_err(|failure| failure.to_string())?;
-    let (trace, truth) = observers;
+    let config = RunConfig::new(scenario);
+    let trace = TraceLog::new(Vec::new());
+    let mut observers = (trace, (truth, Curves::new(&config)));
+    let summary = in_process(&config, &mut observers).map_err(|failure| failure.to_string())?;
+    let (trace, (truth, curves)) = observers;
+    let (trace, hash) = trace.finish().map_err(unwritten)?;
+    let summary = Summarised {
+        summary,
+        trace_sha256: hash.to_string(),
+    };
+    let json = |error: serde_json::Error| error.to_string();
     Ok(Results {
-        trace: trace.finish().map_err(unwritten)?.0,
+        trace,
         truth: truth.finish().map_err(unwritten)?,
-        summary: serde_json::to_vec(&summary).map_err(|error| error.to_string())?,
+        summary: serde_json::to_vec(&summary).map_err(json)?,
+        drawing: serde_json::to_vec(&curves.finish(&config)).map_err(json)?,
     })
 }
 
 thread_local! {
     static INPUT: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
-    /// Trace, truth, summary, error.
-    static OUTPUT: RefCell<[Vec<u8>; 4]> = const { RefCell::new([const { Vec::new() }; 4]) };
+    /// Trace, truth, summary, error, drawing.
+    static OUTPUT: RefCell<[Vec<u8>; 5]> = const { RefCell::new([const { Vec::new() }; 5]) };
 }
 
 /// Makes room for a request of `len` bytes and returns the address to write it to.
@@ -108,12 +127,19 @@ pub extern "C" fn run() -> u32 {
             trace,
             truth,
             summary,
+            drawing,
         }) => {
-            OUTPUT.set([trace, truth, summary, Vec::new()]);
+            OUTPUT.set([trace, truth, summary, Vec::new(), drawing]);
             0
         }
         Err(error) => {
-            OUTPUT.set([Vec::new(), Vec::new(), Vec::new(), error.into_bytes()]);
+            OUTPUT.set([
+                Vec::new(),
+                Vec::new(),
+                Vec::new(),
+                error.into_bytes(),
+                Vec::new(),
+            ]);
             1
         }
     }
@@ -185,7 +211,7 @@ mod tests {
     fn an_error_leaves_no_results() {
         input(2);
         assert_eq!(run(), 1);
-        assert_eq!([0, 1, 2, 4].map(|which| output_len(which)), [0; 4]);
+        assert_eq!([0, 1, 2, 4, 5].map(|which| output_len(which)), [0; 5]);
         assert!(output_len(3) > 0);
     }
 }
