@@ -24,7 +24,7 @@ pub fn histogram(timing: &Timing) -> String {
     let rows = [
         ("sample after its deadline", &timing.lateness),
         ("period minus its nominal value", &timing.jitter),
-        ("feedback to command, age at use", &timing.latency),
+        ("sample due to command, age at use", &timing.age),
     ];
     let legend = TOP + ROW * rows.len() as f64;
     let limits = timing.limits();

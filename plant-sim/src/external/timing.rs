@@ -83,9 +83,17 @@ pub struct Timing {
     pub lateness: Distribution,
     /// Difference of the time between two samples from the period.
     pub jitter: Distribution,
-    /// Feedback out to command in: the age of a measurement when its command begins to act, since drives apply a
-    /// command when it arrives.
+    /// Feedback out to command in.
     pub latency: Distribution,
+    /// Sample due to command in, of each sample: the age of a measurement when its command begins to act, since drives apply
+    /// a command when it arrives. A sample without a command counts with the time that passed without one.
+    pub age: Distribution,
+    /// By how much the present sample was late.
+    late: Duration,
+    /// Samples in a row without a command.
+    unanswered: u32,
+    /// Longest time between two samples.
+    gap: Duration,
     missed: u64,
     overruns: u64,
 }
@@ -99,6 +107,10 @@ impl Timing {
             lateness: Distribution::default(),
             jitter: Distribution::default(),
             latency: Distribution::default(),
+            age: Distribution::default(),
+            late: Duration::ZERO,
+            unanswered: 0,
+            gap: Duration::ZERO,
             missed: 0,
             overruns: 0,
         }
@@ -107,24 +119,31 @@ impl Timing {
     /// A sample was due at `deadline` and taken at `now`.
     pub fn woke(&mut self, deadline: Duration, now: Duration) {
         let late = now.saturating_sub(deadline);
+        self.late = late;
         self.lateness.add(late);
         if late >= self.period {
             self.overruns += 1;
         }
         if let Some(last) = self.last.replace(now) {
-            self.jitter
-                .add(now.saturating_sub(last).abs_diff(self.period));
+            let gap = now.saturating_sub(last);
+            self.gap = self.gap.max(gap);
+            self.jitter.add(gap.abs_diff(self.period));
         }
     }
 
     /// The command of a sample arrived this long after its feedback.
     pub fn answered(&mut self, latency: Duration) {
         self.latency.add(latency);
+        self.age.add(self.late + latency);
+        self.unanswered = 0;
     }
 
     /// The command of a sample had not arrived when the next was due.
     pub fn missed(&mut self) {
         self.missed += 1;
+        self.unanswered += 1;
+        self.age
+            .add(self.late.max(self.period) + self.period * (self.unanswered - 1));
     }
 
     /// Samples taken.
@@ -173,12 +192,13 @@ impl Timing {
         for (name, times) in [
             ("sample after its deadline", &self.lateness),
             ("period minus its nominal value", &self.jitter),
-            ("feedback to command, age at use", &self.latency),
+            ("feedback to command", &self.latency),
+            ("sample due to command, age at use", &self.age),
         ] {
             let [half, most, nearly] = [0.5, 0.99, 0.999].map(|share| us(times.quantile(share)));
             let _ = writeln!(
                 text,
-                "  {name:<32} {half:10.0} {most:10.0} {nearly:10.0} {:10.0}",
+                "  {name:<33}{half:10.0} {most:10.0} {nearly:10.0} {:10.0}",
                 us(times.max())
             );
         }
@@ -191,16 +211,14 @@ impl Timing {
             text,
             "watchdogs                             limit   measured     margin  us"
         );
-        // The worst wait of a watchdog: a late sample, then its late command.
-        let worst = self.lateness.max() + self.latency.max();
-        let gap = self.period + self.jitter.max();
+        let (worst, gap) = (self.age.max(), self.gap);
         for ((name, limit), measured) in self.limits().into_iter().zip([worst, worst, gap, gap]) {
             let (limit, measured) = (us(limit), us(measured));
             let _ = writeln!(
                 text,
                 "  {name:<34} {limit:8.0} {measured:10.0} {:10.0}{}",
                 limit - measured,
-                if measured > limit { "  exceeded" } else { "" }
+                if measured >= limit { "  exceeded" } else { "" }
             );
         }
         text
@@ -249,7 +267,33 @@ mod tests {
         assert_eq!(timing.jitter.max(), US * 2500);
         let report = timing.report();
         assert!(report.contains("late commands 1, overruns 1"), "{report}");
-        // 1000 us allowed, 2500 us late and 200 us for the answer.
+        // The last sample was 2500 us late and has its answer 200 us after that; then one has none within its 1000 us.
+        assert_eq!(timing.age.max(), US * 2700);
         assert!(report.contains("-1700  exceeded"), "{report}");
+    }
+
+    #[test]
+    fn what_was_late_in_one_sample_is_not_added_to_what_was_late_in_another() {
+        let mut timing = Timing::new(US * 1000);
+        // 600 us late and answered within 100 us; on time and answered after 700 us: 700 us either way.
+        timing.woke(US * 1000, US * 1600);
+        timing.answered(US * 100);
+        timing.woke(US * 2000, US * 2000);
+        timing.answered(US * 700);
+        assert_eq!(timing.age.max(), US * 700);
+        // The samples were 400 us apart, so nothing was ever silent for longer than that.
+        let report = timing.report();
+        assert!(!report.contains("exceeded"), "{report}");
+        assert!(report.contains("late commands 0"), "{report}");
+    }
+
+    #[test]
+    fn a_controller_that_is_silent_for_many_samples_is_as_old_as_all_of_them() {
+        let mut timing = Timing::new(US * 1000);
+        for sample in 0..4 {
+            timing.woke(US * 1000 * sample, US * 1000 * sample);
+            timing.missed();
+        }
+        assert_eq!(timing.age.max(), US * 4000);
     }
 }
