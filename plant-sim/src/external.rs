@@ -28,6 +28,8 @@ use protocol::messages::{Message, Mode};
 
 use sim::peer::PeerError;
 
+use crate::say;
+
 pub use lock_step::LockStep;
 pub use measure::measure;
 pub use picture::histogram;
@@ -98,8 +100,8 @@ impl Remote {
 
     fn lose(&mut self, why: String) {
         if self.met && self.lost.is_none() {
-            eprintln!(
-                "plant-sim: the controller on {} {why}; continuing without it",
+            say!(
+                "plant-sim: the controller on {} {why}; going on without it",
                 self.bus
             );
         }

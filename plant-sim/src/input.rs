@@ -3,8 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use sim::model::{ModelError, Payload, RobotModel};
-use sim::scenario::{self, Scenario, ScenarioError};
+use sim::model::{self, ModelError, Payload, RobotModel};
+use sim::scenario::{self, Change, Scenario, ScenarioError};
 
 /// Why an input cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -16,6 +16,12 @@ pub enum InputError {
     )]
     NoScenario {
         /// The requested name.
+        name: String,
+    },
+    /// Neither a built-in robot nor a file.
+    #[error("no robot '{name}': neither a file nor one of {}", model::names())]
+    NoRobot {
+        /// What was asked for.
         name: String,
     },
     /// The file cannot be read.
@@ -43,25 +49,32 @@ pub enum InputError {
 ///
 /// # Errors
 /// See [`InputError`].
-pub fn scenario(name: &str) -> Result<Scenario, InputError> {
-    if let Some(scenario) = Scenario::built_in(name) {
-        return Ok(scenario);
-    }
-    let path = Path::new(name);
-    if !path.exists() {
-        return Err(InputError::NoScenario { name: name.into() });
-    }
-    Ok(Scenario::parse(&text(path)?, name)?)
+pub fn scenario(name: &str, changes: &[Change]) -> Result<Scenario, InputError> {
+    let text = match scenario::built_in(name) {
+        Some(text) => text.to_owned(),
+        None if !Path::new(name).exists() => {
+            return Err(InputError::NoScenario { name: name.into() });
+        }
+        None => self::text(Path::new(name))?,
+    };
+    Ok(Scenario::parse_with(&text, name, changes)?)
 }
 
-/// The robot in this file, with warnings about numbers in it that contradict each other.
+/// The robot of this name, or in this file, with warnings about numbers in it that contradict each other.
 ///
 /// # Errors
 /// See [`InputError`].
-pub fn robot(path: &Path) -> Result<(RobotModel, Vec<String>), InputError> {
+pub fn robot(name: &str) -> Result<(RobotModel, Vec<String>), InputError> {
+    if let Some(robot) = RobotModel::built_in(name) {
+        return Ok((robot, Vec::new()));
+    }
+    let path = Path::new(name);
+    if !path.exists() {
+        return Err(InputError::NoRobot { name: name.into() });
+    }
     let (mut model, warnings) =
         RobotModel::from_json(&text(path)?).map_err(|source| in_file(path, source))?;
-    model.source.origin = path.display().to_string();
+    model.source.origin = name.into();
     Ok((model, warnings))
 }
 
@@ -89,20 +102,25 @@ fn in_file(path: &Path, source: ModelError) -> InputError {
 
 #[cfg(test)]
 mod tests {
-    use super::{robot, scenario};
+    use super::{payload, robot, scenario};
 
     #[test]
     fn what_is_not_there_is_named_with_what_is() {
-        let message = scenario("nowhere.toml").unwrap_err().to_string();
+        let message = scenario("nowhere.toml", &[]).unwrap_err().to_string();
         assert!(
             message.contains("nowhere.toml") && message.contains("gate, gate-mismatch"),
             "{message}"
         );
-        let message = robot("no/such/robot.json".as_ref())
+        let message = robot("no/such/robot.json").unwrap_err().to_string();
+        assert!(
+            message.contains("no/such/robot.json") && message.contains("irb930-22-1.05"),
+            "{message}"
+        );
+        let message = payload("no/such/payload.json".as_ref())
             .unwrap_err()
             .to_string();
         assert!(
-            message.contains("no/such/robot.json") && message.contains("cannot be read"),
+            message.contains("no/such/payload.json") && message.contains("cannot be read"),
             "{message}"
         );
     }

@@ -12,6 +12,7 @@
 //! report                 the pages about runs (sources in pages)
 //! chart                  the SVG of plot and of external's histogram
 //! eval, input            models evaluated over the rows of a table; scenarios and robots from files
+//! say, interrupt, guard  words to the terminal, signals, our own faults
 //! ```
 //!
 //! The command line (`cli`, in the binary) calls these, one file per subcommand. They use `sim` for the simulation,
@@ -25,13 +26,17 @@
 //! send it through a link or a FIFO, wait for the answers, and compare them with those of the twin.
 
 #![forbid(unsafe_code)]
+// They panic where standard output or error is full or gone; `say!` and the sinks of results do not.
+#![deny(clippy::print_stderr, clippy::print_stdout)]
 
 mod chart;
 pub mod check;
 pub mod crash;
 pub mod eval;
 pub mod external;
+pub mod guard;
 pub mod input;
+pub mod interrupt;
 pub mod monitor;
 pub mod output;
 pub mod parameters;
@@ -43,5 +48,6 @@ pub mod record;
 pub mod replay;
 pub mod report;
 pub mod run;
+pub mod say;
 pub mod twin;
 pub mod viewers;

@@ -1,15 +1,13 @@
 //! `plant-sim`: runs the controller against the simulated robot, and inspects the results.
 
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 mod cli;
 
 use std::process::ExitCode;
 
+use plant_sim::guard::guard;
+
 fn main() -> ExitCode {
-    match cli::main() {
-        Ok(code) => code,
-        Err(message) => {
-            eprintln!("plant-sim: {message}");
-            ExitCode::FAILURE
-        }
-    }
+    ExitCode::from(guard(cli::main))
 }

@@ -15,12 +15,13 @@ use channel::{Fault, Request, Setup};
 use firmware::cabinet::reset::Stop;
 use firmware::control::controller::Config;
 use firmware::control::phase::Phase;
-pub use image::build;
+pub use image::image;
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
 use protocol::time::Instant;
 
 use crate::external::peers;
+use crate::say;
 use crate::twin::Twin;
 use board::Board;
 use sim::controller::COMPUTE;
@@ -91,10 +92,7 @@ impl Qemu {
     /// # Errors
     /// The image cannot be built, the emulator is missing or does not answer; the error says what to do.
     pub fn start(config: Config, options: &Options) -> Result<Self, PeerError> {
-        let image = match &options.image {
-            Some(image) => image.clone(),
-            None => build(IMAGE)?,
-        };
+        let image = image(options.image.as_deref(), IMAGE)?;
         let setup = Setup {
             channel: options.channel,
             config,
@@ -225,7 +223,7 @@ impl Qemu {
         if self.channel.take() == Some(Channel::Uart)
             && let Ok(lost @ 1..) = self.board.close_bus()
         {
-            eprintln!("plant-sim: the controller in QEMU has lost {lost} bytes on its UART");
+            say!("plant-sim: the controller in QEMU has lost {lost} bytes on its UART");
         }
         if let Some(count) = self.count.take()
             && let Ok(stack) = self.board.ask(&Request::Stack, &mut Vec::new())

@@ -13,6 +13,7 @@ use sim::run::{Failure, with_controller};
 use sim::setup::{RunConfig, SetupError};
 use sim::summary::Summary;
 
+use crate::interrupt::Heeding;
 use crate::output::{Folder, OutputError};
 use crate::progress::Progress;
 
@@ -46,8 +47,8 @@ pub struct Results {
     pub wall_time_s: f64,
     /// Simulated over wall time.
     pub real_time_factor: f64,
-    /// SHA-256 of `trace.log`.
-    pub trace_sha256: String,
+    /// SHA-256 of `trace.log`; `null` where none is kept.
+    pub trace_sha256: Option<String>,
 }
 
 impl Results {
@@ -58,16 +59,50 @@ impl Results {
 }
 
 /// Runs a scenario and writes `trace.log`, `truth.csv` and `summary.json` into `out`; each appears under its name
+const RESULTS: [&str; 5] = [
+    "trace.log",
+    "truth.csv",
+    "summary.json",
+    "report.html",
+    "controller.log",
+];
+
 /// once it is complete.
 ///
-/// A scenario that could not be completed still has a summary, with `completed` false and the reason in `error`.
+/// # Errors
+/// See [`Folder::open`].
+pub fn folder(out: &Path) -> Result<Folder, OutputError> {
+    Folder::open(out, &RESULTS)
+}
+
+/// What is kept of a run, and where.
+#[derive(Debug)]
+pub struct Recording<'f> {
+    /// Where.
+    pub folder: &'f Folder,
+    /// Whether `trace.log` and `truth.csv` are kept beside `summary.json`.
+    pub traces: bool,
+    /// Whether a person is to see how far the run is.
+    pub progress: bool,
+}
+
+/// Runs a scenario and writes `trace.log`, `truth.csv` and `summary.json` into `out`: all of them appear when all of them
+/// are complete. What an older run has left goes when this one begins.
+///
+/// A scenario that could not be completed still has a summary, with `completed` false and the reason in `error`; so has one
+/// that a signal has ended.
 ///
 /// # Errors
 /// Nothing was run, or nothing could be written; see [`ExecuteError`].
 pub fn execute(config: &RunConfig, out: &Path) -> Result<Results, ExecuteError> {
+    let recording = Recording {
+        folder: &folder(out)?,
+        traces: true,
+        progress: false,
+    };
     execute_with(
         config,
-        out,
+        &recording,
         |config| Ok(InProcess::new(config)),
         &mut (),
         (),
@@ -81,33 +116,40 @@ pub fn execute(config: &RunConfig, out: &Path) -> Result<Results, ExecuteError> 
 /// Like [`execute`], and [`ExecuteError::Controller`] if `connect` fails.
 pub fn execute_with<C: Peer, P: Pace, O: Observer>(
     config: &RunConfig,
-    out: &Path,
+    recording: &Recording<'_>,
     connect: impl FnOnce(Config) -> Result<C, PeerError>,
     pace: &mut P,
     observer: O,
 ) -> Result<Results, ExecuteError> {
-    let folder = Folder::open(out)?;
+    let folder = recording.folder;
     let failed = |source| folder.failed(source);
-    let truth = TruthLog::new(folder.create("truth.csv")?).map_err(failed)?;
-    let mut observers = (
-        TraceLog::new(folder.create("trace.log")?),
-        (truth, (Progress::new(config.scenario.cycles), observer)),
-    );
+    // What cannot begin leaves older results alone.
+    config.rig()?;
+    folder.clear()?;
+    let kept = |name| recording.traces.then(|| folder.create(name)).transpose();
+    let trace = kept("trace.log")?.map(TraceLog::new);
+    let truth = kept("truth.csv")?
+        .map(TruthLog::new)
+        .transpose()
+        .map_err(failed)?;
+    let progress = recording
+        .progress
+        .then(|| Progress::new(config.scenario.cycles));
+    let mut observers = (trace, (truth, (progress, observer)));
 
     let began = Instant::now();
-    let summary =
-        with_controller(config, connect, pace, &mut observers).map_err(
-            |failure| match failure {
-                Failure::Setup(error) => ExecuteError::from(error),
-                Failure::Controller(error) => error.into(),
-                Failure::Output(source) => failed(source).into(),
-            },
-        )?;
+    let summary = with_controller(config, connect, &mut Heeding(pace), &mut observers).map_err(
+        |failure| match failure {
+            Failure::Setup(error) => ExecuteError::from(error),
+            Failure::Controller(error) => error.into(),
+            Failure::Output(source) => failed(source).into(),
+        },
+    )?;
     let wall_time_s = began.elapsed().as_secs_f64();
 
     let (trace, (truth, _)) = observers;
-    let (trace, hash) = trace.finish().map_err(failed)?;
-    let truth = truth.finish().map_err(failed)?;
+    let trace = trace.map(TraceLog::finish).transpose().map_err(failed)?;
+    let truth = truth.map(TruthLog::finish).transpose().map_err(failed)?;
     let results = Results {
         version: env!("CARGO_PKG_VERSION"),
         commit: env!("COMMIT"),
@@ -117,10 +159,17 @@ pub fn execute_with<C: Peer, P: Pace, O: Observer>(
         real_time_factor: summary.sim_time_s / wall_time_s,
         summary,
         wall_time_s,
-        trace_sha256: hash.to_string(),
+        trace_sha256: trace.as_ref().map(|(_, hash)| hash.to_string()),
     };
-    trace.persist()?;
-    truth.persist()?;
-    folder.write("summary.json", &results.to_json())?;
+    let summary = folder.prepare("summary.json", &results.to_json())?;
+    // All are written. The summary comes last: where it is, the others are complete.
+    for file in trace
+        .map(|(file, _)| file)
+        .into_iter()
+        .chain(truth)
+        .chain([summary])
+    {
+        file.persist()?;
+    }
     Ok(results)
 }

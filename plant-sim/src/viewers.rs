@@ -12,6 +12,9 @@ use protocol::frame::CanFrame;
 use protocol::time::Instant;
 use sim::observer::{Observer, Pace};
 
+use crate::interrupt;
+use crate::say;
+
 /// Interval of checking for a client.
 const PATIENCE: Duration = Duration::from_millis(100);
 
@@ -40,6 +43,9 @@ impl Viewers {
     fn wait(&self) -> io::Result<()> {
         let mut hub = self.hub.borrow_mut();
         while !matches!(&*hub, Link::SlcanHub(hub) if hub.is_open()) {
+            if interrupt::asked() {
+                return Err(interrupt::error());
+            }
             hub.wait(PATIENCE).map_err(io::Error::other)?;
         }
         Ok(())
@@ -67,7 +73,7 @@ impl Pace for Viewers {
         match self.origin {
             Some(origin) => sleep_until(origin + now),
             None => {
-                eprintln!("plant-sim: waiting for a client");
+                say!("plant-sim: waiting for a client");
                 self.wait()?;
                 self.origin = Some(monotonic().saturating_sub(now));
             }

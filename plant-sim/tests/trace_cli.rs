@@ -64,7 +64,7 @@ fn a_log_without_anything_to_judge_has_an_exit_code_of_its_own() {
         ("check", FOREIGN, "no frame of this protocol"),
         ("replay", "", "the log is empty"),
         ("replay", FOREIGN, "no command"),
-        ("plot", "", "can be drawn"),
+        ("plot", "", "the log is empty"),
         ("plot", FOREIGN, "can be drawn"),
         ("stats", "# nothing\n\n", "the log is empty"),
         ("decode", "", "the log is empty"),

@@ -229,7 +229,7 @@ fn what_cannot_be_done_is_refused_with_the_reason() {
     assert!(!summary.completed);
     let error = summary.error.unwrap();
     assert!(
-        error.contains("jump refused") && error.contains("value 2, limit 1.05"),
+        error.contains("jump refused") && error.contains("parameter to: 2 m, limit 1.05 m"),
         "{error}"
     );
 

@@ -17,6 +17,7 @@
 //! bus                    arbitration and exact frame times
 //! plant, model           the robot in f64, derived independently, and its data
 //! metrics                errors, settling, utilisation
+//! rehearsal              a scenario as the controller plans it, without a robot
 //! ```
 //!
 //! The plant names neither the controller nor the bus.
@@ -46,6 +47,8 @@ pub mod operator;
 pub mod peer;
 pub mod plant;
 pub mod record;
+mod refusal;
+pub mod rehearsal;
 pub mod rig;
 pub mod run;
 pub mod scenario;

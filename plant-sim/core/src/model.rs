@@ -194,6 +194,11 @@ impl PartialEq for RobotModel {
     }
 }
 
+/// Names of the robots that come with the program.
+pub fn names() -> String {
+    BUILT_IN.map(|(name, _)| name).join(", ")
+}
+
 impl RobotModel {
     /// The default robot: IRB 930-22/1.05.
     pub fn irb_930_22_105() -> Self {

@@ -92,6 +92,7 @@ impl<O: Observer> Observer for &mut O {
     }
 }
 
+/// An observer that may be left out.
 impl<O: Observer> Observer for Option<O> {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         self.as_mut()

@@ -2,7 +2,7 @@
 //!
 //! It knows the controller by its messages alone. Every wait has a limit, and its error names what is late.
 
-mod program;
+pub(crate) mod program;
 
 use protocol::codec::{self, Encoder};
 use protocol::frame::CanFrame;
@@ -15,15 +15,17 @@ use protocol::time::{Duration, Instant, Period};
 
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::scenario::Scenario;
-use crate::world::{CellEvent, OperatorError, World};
-use program::{Action, program};
+use crate::world::{CellEvent, OperatorError, Spot, World};
+use program::{Action, Program, Task};
 
 /// Longest wait for a reply.
 const REPLY_LIMIT: Duration = Duration::from_secs(2);
 /// Longest wait for a mode to change.
 const MODE_LIMIT: Duration = Duration::from_secs(2);
-/// Longest wait for a move to end.
-const MOVE_LIMIT: Duration = Duration::from_secs(120);
+/// Longest wait for a move at full speed to end, s; one at a thousandth of it may take a thousand times as long.
+const MOVE_LIMIT_S: f64 = 120.0;
+/// Longest wait for a move of any speed, s.
+const ANY_MOVE_LIMIT_S: f64 = 1e9;
 /// Time without any frame after which the controller counts as silent: ten heartbeats.
 const SILENCE_LIMIT: Duration = Duration::from_secs(1);
 
@@ -41,8 +43,8 @@ enum Progress {
 /// If something goes wrong, it reports the error once, requests stop and disable, and does no more.
 #[derive(Clone, Debug)]
 pub struct Operator {
-    actions: std::vec::IntoIter<Action>,
-    current: Option<Action>,
+    program: Program,
+    current: Option<Task>,
     progress: Progress,
     /// Polling period, and time of the next poll.
     period: Period,
@@ -59,15 +61,17 @@ pub struct Operator {
     heard: Instant,
     /// Sequence number of the last accepted move.
     last_move: Option<u8>,
+    /// Speed of the slowest move since the arm last arrived.
+    slowest: f32,
 }
 
 impl Operator {
     /// An operator that runs `scenario`.
     pub fn new(scenario: &Scenario) -> Self {
-        let mut actions = program(scenario).into_iter();
+        let mut program = Program::new(scenario);
         Self {
-            current: actions.next(),
-            actions,
+            current: program.next(),
+            program,
             progress: Progress::Due,
             period: Period::of_rate(scenario.rate_hz),
             next: Instant::ORIGIN,
@@ -80,6 +84,7 @@ impl Operator {
             alarmed: false,
             heard: Instant::ORIGIN,
             last_move: None,
+            slowest: 1.0,
         }
     }
 
@@ -117,11 +122,11 @@ impl Operator {
                 world.outcome = (!self.given_up).then_some(Ok(()));
             }
             Ok(false) => {}
-            Err(_) if self.given_up => self.stop_working(vec![]),
+            Err(_) if self.given_up => self.stop_working([]),
             Err(error) => {
                 world.outcome = Some(Err(error));
                 self.given_up = true;
-                self.stop_working(vec![
+                self.stop_working([
                     Action::Request(MotionRequest::Stop),
                     Action::Request(MotionRequest::Disable),
                 ]);
@@ -129,9 +134,9 @@ impl Operator {
         }
     }
 
-    fn stop_working(&mut self, last: Vec<Action>) {
-        self.actions = last.into_iter();
-        self.current = self.actions.next();
+    fn stop_working<const N: usize>(&mut self, last: [Action; N]) {
+        self.program.only(last);
+        self.current = self.program.next();
         self.progress = Progress::Due;
     }
 
@@ -146,7 +151,7 @@ impl Operator {
             self.watch(now)?;
         }
         loop {
-            let Some(action) = self.current else {
+            let Some(Task { action, spot }) = self.current else {
                 return Ok(true);
             };
             let begun = match self.progress {
@@ -160,11 +165,11 @@ impl Operator {
                 }
                 Progress::Since(begun) => begun,
             };
-            if !self.is_complete(&action, now.since(begun))? {
+            if !self.is_complete(&action, spot, now.since(begun))? {
                 return Ok(false);
             }
             self.progress = Progress::Due;
-            self.current = self.actions.next();
+            self.current = self.program.next();
             if let Action::Cell(event) = action {
                 match event {
                     CellEvent::Attach(payload) => world.plant.attach(payload),
@@ -213,7 +218,12 @@ impl Operator {
     }
 
     /// Whether the action is complete.
-    fn is_complete(&mut self, action: &Action, waited: Duration) -> Result<bool, OperatorError> {
+    fn is_complete(
+        &mut self,
+        action: &Action,
+        spot: Option<Spot>,
+        waited: Duration,
+    ) -> Result<bool, OperatorError> {
         let (complete, limit) = match action {
             Action::Hello => {
                 if let Some(hello) = self.greeted
@@ -234,43 +244,67 @@ impl Operator {
                     }
                     Some(Outcome::Refused(refusal)) => {
                         return Err(OperatorError::Refused {
-                            request: request.name(),
+                            spot,
+                            request: *request,
                             refusal,
                         });
                     }
                     Some(Outcome::Accepted) if request.is_move() => {
                         self.last_move = Some(self.sequence);
                     }
+                    None => self.slowest = self.slowest.min(speed_of(request)),
                     _ if *request == MotionRequest::Stop => {
                         // The current move will never complete.
                         self.last_move = None;
                     }
                     _ => {}
                 }
-                (self.reply.is_some(), REPLY_LIMIT)
+                // A move is answered once it is planned, which may have to wait until earlier moves leave the queue.
+                let waits = request.is_move() && self.state.is_some_and(|state| state.queue > 0);
+                let limit = if waits {
+                    self.move_limit()
+                } else {
+                    REPLY_LIMIT
+                };
+                (self.reply.is_some(), limit)
             }
             Action::WaitMode(mode) => (
                 self.state.is_some_and(|state| state.mode == *mode),
                 MODE_LIMIT,
             ),
-            Action::WaitArrived => (
-                self.state.is_some_and(|state| {
+            Action::WaitArrived => {
+                let arrived = self.state.is_some_and(|state| {
                     state.mode == Mode::Enabled
                         && state.queue == 0
                         && self.last_move.is_none_or(|last| last == state.completed)
-                }),
-                MOVE_LIMIT,
-            ),
+                });
+                let limit = self.move_limit();
+                if arrived {
+                    self.slowest = 1.0;
+                }
+                (arrived, limit)
+            }
             Action::Dwell(time) => (waited >= *time, Duration::MAX),
             Action::Cell(_) => (true, Duration::MAX),
         };
-        if !complete && waited > limit {
-            return Err(OperatorError::Late {
+        if complete || waited <= limit {
+            return Ok(complete);
+        }
+        Err(match action {
+            Action::WaitArrived => OperatorError::Unfinished {
+                spot,
+                speed: self.slowest,
+                limit,
+            },
+            _ => OperatorError::Late {
                 what: self.awaited(action),
                 limit,
-            });
-        }
-        Ok(complete)
+            },
+        })
+    }
+
+    fn move_limit(&self) -> Duration {
+        Duration::from_seconds((MOVE_LIMIT_S / f64::from(self.slowest)).min(ANY_MOVE_LIMIT_S))
     }
 
     /// What an action waits for, as text.
@@ -284,6 +318,16 @@ impl Operator {
             Action::WaitArrived => "end of the move".into(),
             Action::Dwell(_) | Action::Cell(_) => "end of a dwell".into(),
         }
+    }
+}
+
+/// Share of full speed that a request asks for.
+fn speed_of(request: &MotionRequest) -> f32 {
+    match request {
+        MotionRequest::Jump { speed, .. }
+        | MotionRequest::MoveLine { speed, .. }
+        | MotionRequest::MoveJoint { speed, .. } => *speed,
+        _ => 1.0,
     }
 }
 

@@ -43,8 +43,8 @@ pub enum RunError {
     /// Output failed.
     #[error("cannot write results: {0}")]
     Output(#[from] io::Error),
-    /// The pace of the run could not be kept.
-    #[error("cannot keep the pace: {0}")]
+    /// The pace ended the run.
+    #[error("{0}")]
     Pace(io::Error),
     /// A process or a board failed.
     #[error(transparent)]

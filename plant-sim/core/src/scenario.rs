@@ -1,12 +1,18 @@
 //! Scenarios: start, payload, law, and the steps of a cycle, as TOML text or by name.
 
+mod change;
 mod check;
+mod error;
 
+use protocol::parameters::ControllerParameter as Parameter;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::model::Payload;
 use crate::selection::LawChoice;
-use crate::text::nearest;
+
+pub use change::Change;
+use error::with_nearest;
+pub use error::{Place, ScenarioError};
 
 pub use crate::text::Source;
 
@@ -53,6 +59,9 @@ pub struct Scenario {
     /// The text that this was read from, for places in messages.
     #[serde(skip)]
     pub source: Source,
+    /// Changes to the values of that text.
+    #[serde(skip)]
+    pub changes: Vec<Change>,
 }
 
 /// An array of exactly `N` numbers: serde alone ignores surplus elements.
@@ -68,16 +77,41 @@ fn exactly<'de, D: Deserializer<'de>, const N: usize>(
     })
 }
 
-/// Gains of the closed loop, the same for every law.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+/// Gains of the closed loop, the same for every law. Those left out are the controller's own at this rate.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct GainsSpec {
     /// Natural frequency of the error dynamics, rad/s.
-    pub bandwidth: f64,
+    pub bandwidth: Option<f64>,
     /// Damping ratio.
-    pub damping: f64,
+    pub damping: Option<f64>,
     /// Corner of the disturbance observer, or 1 / integral time, rad/s.
-    pub observer: f64,
+    pub observer: Option<f64>,
+}
+
+impl GainsSpec {
+    /// These, with the controller's own for those that are left out, for samples every `period` seconds.
+    pub(crate) fn resolved(&self, period: f32) -> Self {
+        let [bandwidth, damping, observer] = self.each(period).map(|(_, _, value)| Some(value));
+        Self {
+            bandwidth,
+            damping,
+            observer,
+        }
+    }
+
+    /// Key, parameter and value of each gain, for samples every `period` seconds.
+    pub(crate) fn each(&self, period: f32) -> [(&'static str, Parameter, f64); 3] {
+        [
+            ("gains.bandwidth", Parameter::Bandwidth, self.bandwidth),
+            ("gains.damping", Parameter::Damping, self.damping),
+            ("gains.observer", Parameter::Observer, self.observer),
+        ]
+        .map(|(key, parameter, value)| {
+            let own = || f64::from(parameter.initial(period));
+            (key, parameter, value.unwrap_or_else(own))
+        })
+    }
 }
 
 /// A payload as model files write it.
@@ -95,8 +129,15 @@ pub struct PayloadSpec {
 }
 
 impl PayloadSpec {
-    /// A compact body of `mass` kg: centre of mass 50 mm below the flange, radius of gyration
-    /// as for the 2 kg benchmark payload.
+    /// An empty hand.
+    pub(crate) const NOTHING: Self = Self {
+        mass: 0.0,
+        com_flange_frame: [0.0; 3],
+        inertia_com_diag: [0.0; 3],
+    };
+
+    /// A compact body of `mass` kg: centre of mass 50 mm below the flange, radius of gyration as
+    /// that of the 2 kg benchmark payload.
     pub fn compact(mass: f64) -> Self {
         Self {
             mass,
@@ -164,6 +205,21 @@ pub enum Step {
     Place {},
 }
 
+impl Step {
+    /// Its key.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Jump(_) => "jump",
+            Self::Line(_) => "line",
+            Self::Joints(_) => "joints",
+            Self::Dwell(_) => "dwell",
+            Self::Stop(_) => "stop",
+            Self::Pick(_) => "pick",
+            Self::Place {} => "place",
+        }
+    }
+}
+
 /// A gate move.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -196,37 +252,10 @@ fn full() -> f64 {
     1.0
 }
 
-/// Why a scenario was refused.
-#[derive(Debug, thiserror::Error)]
-pub enum ScenarioError {
-    /// The text is not a scenario; the message names line and key.
-    #[error("scenario {origin}: {message}")]
-    Parse {
-        /// File or name.
-        origin: String,
-        /// What is wrong and where.
-        message: String,
-    },
-    /// A value is not allowed.
-    #[error("scenario {origin}: {}{key} is {value}; allowed: {allowed}", at(*place))]
-    Value {
-        /// File or name.
-        origin: String,
-        /// Line and column, counted from 1, where the value is in the text.
-        place: Option<(usize, usize)>,
-        /// Key, as in `cycle[2].jump.top`.
-        key: String,
-        /// The value.
-        value: String,
-        /// What is allowed.
-        allowed: String,
-    },
-}
-
-fn at(place: Option<(usize, usize)>) -> String {
-    place.map_or_else(String::new, |(line, column)| {
-        format!("line {line}, column {column}: ")
-    })
+/// The text of the scenario of this name that comes with the program.
+pub fn built_in(name: &str) -> Option<&'static str> {
+    let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
+    Some(text)
 }
 
 /// Names of the scenarios that come with the program.
@@ -237,7 +266,7 @@ pub fn names() -> String {
 impl Scenario {
     /// The scenario of this name that comes with the program.
     pub fn built_in(name: &str) -> Option<Self> {
-        let (name, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
+        let text = built_in(name)?;
         Some(Self::parse(text, name).expect("the built-in scenarios are valid"))
     }
 
@@ -246,14 +275,26 @@ impl Scenario {
     /// # Errors
     /// See [`ScenarioError`].
     pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
+        Self::parse_with(text, origin, &[])
+    }
+
+    /// The scenario written in `text` with some values changed, and checked like any other.
+    ///
+    /// # Errors
+    /// See [`ScenarioError`].
+    pub fn parse_with(text: &str, origin: &str, changes: &[Change]) -> Result<Self, ScenarioError> {
         let mut scenario: Self = toml::from_str(text).map_err(|error| ScenarioError::Parse {
             origin: origin.into(),
             message: with_nearest(error.to_string().trim_end()),
         })?;
+        if let Some(changed) = change::changed(text, origin, changes)? {
+            scenario = changed;
+        }
         scenario.source = Source {
             origin: origin.into(),
             text: text.into(),
         };
+        scenario.changes = changes.to_vec();
         scenario.check()?;
         Ok(scenario)
     }
@@ -266,34 +307,31 @@ impl Scenario {
         toml::to_string(self).expect("numbers and texts can be written")
     }
 
-    /// The payload for a mass of `kg` alone: the scenario's own body, scaled in density, or a compact one; none for 0
-    /// kg.
-    pub fn payload_of(&self, kg: f64) -> Option<PayloadSpec> {
-        if kg == 0.0 {
-            return None;
+    /// Takes the weight of the payload that a person asks for: of what the scenario picks, if it picks, and else of what the
+    /// flange carries from the start. It is the scenario's own body, as much denser or lighter, or a compact one.
+    ///
+    /// # Errors
+    /// Why the scenario has no use for it.
+    pub fn carry(&mut self, kg: f64) -> Result<(), &'static str> {
+        let mut picks = self.cycle.iter_mut().filter_map(|step| match step {
+            Step::Pick(payload) => Some(payload),
+            _ => None,
+        });
+        if let Some(first) = picks.next() {
+            if kg == 0.0 {
+                return Err("picks something, which has a weight");
+            }
+            for payload in picks.chain([first]) {
+                *payload = payload.scaled(kg / payload.mass);
+            }
+            return Ok(());
         }
-        Some(match self.payload {
-            Some(payload) if payload.mass > 0.0 => payload.scaled(kg / payload.mass),
-            _ => PayloadSpec::compact(kg),
-        })
-    }
-}
-
-/// Adds the nearest known key to the message about an unknown one: most likely the one that was meant.
-fn with_nearest(message: &str) -> String {
-    let between_ticks: Vec<&str> = message
-        .rsplit_once("unknown field ")
-        .map_or("", |(_, words)| words)
-        .split('`')
-        .skip(1)
-        .step_by(2)
-        .collect();
-    match between_ticks.split_first() {
-        Some((unknown, known)) => nearest(unknown, known.iter().copied()).map_or_else(
-            || message.into(),
-            |near| format!("{message}\ndid you mean {near}?"),
-        ),
-        None => message.into(),
+        self.payload = match self.payload {
+            _ if kg == 0.0 => None,
+            Some(payload) if payload.mass > 0.0 => Some(payload.scaled(kg / payload.mass)),
+            _ => Some(PayloadSpec::compact(kg)),
+        };
+        Ok(())
     }
 }
 

@@ -1,13 +1,15 @@
 //! Checked setup of a run: from a scenario and two robots to a rig.
 
 use firmware::mechanics::arm::{self, ArmModel};
+use nalgebra::Vector4;
 use protocol::time::Period;
 use protocol::wire::BitTiming;
 
 use crate::bus::Overload;
-use crate::model::RobotModel;
+use crate::maths::hypot;
+use crate::model::{JointLimits, RobotModel};
 use crate::plant::arm::Arm;
-use crate::plant::kinematics::{Pose, inverse};
+use crate::plant::kinematics::{Pose, Unreachable, Violation, inverse};
 use crate::rig::{self, RigConfig};
 use crate::scenario::{Scenario, ScenarioError, Step};
 
@@ -30,7 +32,7 @@ pub enum SetupError {
     Scenario(#[from] ScenarioError),
     /// The start of the scenario is outside the robot's workspace.
     #[error(
-        "scenario {scenario}: the start pose x {x}, y {y}, z {z}, yaw {yaw} is outside the workspace of {robot}"
+        "scenario {scenario}: the start pose x {x}, y {y}, z {z}, yaw {yaw} is outside the workspace of {robot}: {why}"
     )]
     Start {
         /// Scenario.
@@ -45,6 +47,8 @@ pub enum SetupError {
         z: f64,
         /// Pose.
         yaw: f64,
+        /// What is in the way, and what would not be.
+        why: String,
     },
     /// The controller cannot use the model.
     #[error("model {robot}: {source}")]
@@ -125,18 +129,65 @@ impl RunConfig {
     }
 }
 
+/// Joint positions at the start: those of the elbow at the positive side.
 fn start(scenario: &Scenario, robot: &RobotModel) -> Result<[f64; 4], SetupError> {
     let [x, y, z, yaw] = scenario.start;
-    inverse(&robot.geometry, &robot.limits, &Pose { x, y, z, yaw })
-        .ok()
-        .filter(|[positive, _]| positive.violation.is_none())
-        .map(|[positive, _]| positive.q.into())
-        .ok_or_else(|| SetupError::Start {
-            scenario: scenario.name.clone(),
-            robot: robot.name.clone(),
-            x,
-            y,
-            z,
-            yaw,
-        })
+    let solutions = inverse(&robot.geometry, &robot.limits, &Pose { x, y, z, yaw });
+    let why = match solutions {
+        Ok([positive, negative]) => match positive.violation {
+            None => return Ok(positive.q.into()),
+            Some(violation) => {
+                let why = out_of_range(violation, robot, &positive.q);
+                if negative.violation.is_some() {
+                    why
+                } else {
+                    format!(
+                        "{why}, with the elbow at the positive side, where a scenario starts. With the elbow at the other side \
+                         the robot reaches it"
+                    )
+                }
+            }
+        },
+        Err(unreachable) => {
+            let radius = hypot(x, y);
+            let (outer, inner) = (
+                robot.geometry.a1 + robot.geometry.a2,
+                (robot.geometry.a1 - robot.geometry.a2).abs(),
+            );
+            match unreachable {
+                Unreachable::TooFar => {
+                    format!("it is {radius} m from axis 1, and the stretched arm reaches {outer} m")
+                }
+                Unreachable::InsideHole => {
+                    format!(
+                        "it is {radius} m from axis 1, and the folded arm comes no nearer than {inner} m"
+                    )
+                }
+            }
+        }
+    };
+    Err(SetupError::Start {
+        scenario: scenario.name.clone(),
+        robot: robot.name.clone(),
+        x,
+        y,
+        z,
+        yaw,
+        why,
+    })
+}
+
+/// Which axis would be out of its range, where, and what is allowed.
+fn out_of_range(violation: Violation, robot: &RobotModel, q: &Vector4<f64>) -> String {
+    let (axis, name, unit) = match violation {
+        Violation::Shoulder => (0, "shoulder", "rad"),
+        Violation::Elbow => (1, "elbow", "rad"),
+        Violation::TooHigh | Violation::TooLow => (2, "lift", "m"),
+        Violation::Wrist => (3, "wrist", "rad"),
+    };
+    let JointLimits { lower, upper, .. } = &robot.limits;
+    format!(
+        "axis {name} would have to be at {:.6} {unit}; allowed: {} to {} {unit}",
+        q[axis], lower[axis], upper[axis]
+    )
 }

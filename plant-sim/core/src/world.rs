@@ -1,11 +1,14 @@
 //! State that the peers of a run share besides the bus.
 
+use std::fmt;
+
 use firmware::node::Node;
-use protocol::messages::{Fault, Mode, Refusal};
+use protocol::messages::{Fault, Mode, MotionRequest, Refusal};
 use protocol::time::{Duration, Instant};
 
 use crate::model::Payload;
 use crate::plant::Plant;
+use crate::refusal::sentence;
 
 /// State that peers share besides the bus: the robot, used by drives and operator, and what each peer reports to the
 /// run.
@@ -64,16 +67,58 @@ pub enum CellEvent {
     EndCycle,
 }
 
+/// A step of a scenario while it runs. Cycle and index are counted from 0, and shown to people from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Spot {
+    /// Cycle of the run.
+    pub cycle: u32,
+    /// Step of the cycle.
+    pub index: usize,
+    /// Key of the step.
+    pub step: &'static str,
+}
+
+impl Spot {
+    /// Key of the step in the scenario.
+    pub fn key(&self) -> String {
+        format!("cycle[{}].{}", self.index, self.step)
+    }
+}
+
+impl fmt::Display for Spot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // 64 bits: a run may have as many cycles as 32 bits count.
+        let (number, cycle) = (self.index + 1, u64::from(self.cycle) + 1);
+        write!(f, "step {number} of cycle {cycle} ({})", self.key())
+    }
+}
+
+fn of(spot: Option<Spot>) -> String {
+    spot.map_or_else(String::new, |spot| format!("{spot}: "))
+}
+
 /// Why a run ended early.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OperatorError {
     /// The controller refused a request.
-    #[error("{request} refused: {}", sentence(refusal))]
+    #[error("{}{} refused: {}", of(*spot), request.name(), sentence(request, refusal))]
     Refused {
-        /// Name of the request.
-        request: &'static str,
+        /// Step of the scenario that made the request, if any.
+        spot: Option<Spot>,
+        /// Which.
+        request: MotionRequest,
         /// Why.
         refusal: Refusal,
+    },
+    /// A move did not end in time.
+    #[error("{}the move did not end within {:.0} s at {speed} of full speed", of(*spot), limit.seconds())]
+    Unfinished {
+        /// Step of the scenario that waited for it.
+        spot: Option<Spot>,
+        /// Speed of the slowest pending move, as a share of full speed.
+        speed: f32,
+        /// Longest wait.
+        limit: Duration,
     },
     /// Something expected did not arrive in time.
     #[error("the controller is late: no {what} within {:.1} s", limit.seconds())]
@@ -107,20 +152,4 @@ pub enum OperatorError {
         /// Latched fault.
         fault: Fault,
     },
-}
-
-fn sentence(refusal: &Refusal) -> String {
-    let axis = match refusal.axis {
-        0 => " (shoulder)",
-        1 => " (elbow)",
-        2 => " (lift)",
-        3 => " (wrist)",
-        _ => "",
-    };
-    format!(
-        "{}{axis}; value {}, limit {}",
-        refusal.reason.describe(),
-        refusal.value,
-        refusal.limit
-    )
 }

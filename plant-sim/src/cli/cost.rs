@@ -3,7 +3,6 @@
 use std::cell::RefCell;
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
 use std::rc::Rc;
 
 use clap::Args;
@@ -16,7 +15,7 @@ use sim::run::with_controller;
 use sim::selection::LawChoice;
 use sim::setup::RunConfig;
 
-use super::show;
+use super::{Failure, show};
 
 /// Arguments of `cost`.
 #[derive(Args)]
@@ -44,7 +43,7 @@ pub(super) struct CostArgs {
 
 /// Runs two cycles with each image and shows instructions by kind of call and by phase: the second cycle is planned
 /// while the first is still running. The emulator's counts are the same in every run.
-pub(super) fn run(args: &CostArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &CostArgs) -> Result<(), Failure> {
     let whole = measure(args, args.image.as_ref(), IMAGE)?;
     let parts = measure(args, args.cost_image.as_ref(), COST_IMAGE)?;
     let report = Report::new(&whole, &parts);
@@ -54,15 +53,13 @@ pub(super) fn run(args: &CostArgs) -> Result<ExitCode, String> {
     } else {
         show(&report.text())?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
-fn measure(args: &CostArgs, image: Option<&PathBuf>, program: &str) -> Result<Costs, String> {
-    let image = match image {
-        Some(image) => image.clone(),
-        None => qemu::build(program).map_err(|error| error.to_string())?,
-    };
-    let mut scenario = input::scenario(&args.scenario).map_err(|error| error.to_string())?;
+fn measure(args: &CostArgs, image: Option<&PathBuf>, program: &str) -> Result<Costs, Failure> {
+    let image =
+        qemu::image(image.map(PathBuf::as_path), program).map_err(|error| error.to_string())?;
+    let mut scenario = input::scenario(&args.scenario, &[])?;
     scenario.law = args.law;
     scenario.cycles = 2;
     let config = RunConfig::new(scenario);
@@ -80,7 +77,7 @@ fn measure(args: &CostArgs, image: Option<&PathBuf>, program: &str) -> Result<Co
     )
     .map_err(|error| error.to_string())?;
     if let Some(error) = summary.error {
-        return Err(format!("the run was not completed: {error}"));
+        return Err(format!("the run was not completed: {error}").into());
     }
     Ok(costs.take())
 }

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use plant_sim::crash::{self, Planted, Seen};
@@ -10,7 +9,7 @@ use plant_sim::input;
 use plant_sim::qemu;
 use sim::setup::RunConfig;
 
-use super::show;
+use super::{Failure, show};
 
 /// Arguments of `crash`.
 #[derive(Args)]
@@ -22,12 +21,10 @@ pub(super) struct CrashArgs {
 
 /// Plants one fault after another while the arm moves. Fails if one of them does not end in the
 /// safe state.
-pub(super) fn run(args: &CrashArgs) -> Result<ExitCode, String> {
-    let image = match &args.image {
-        Some(image) => image.clone(),
-        None => qemu::build(qemu::FAULTS_IMAGE).map_err(|error| error.to_string())?,
-    };
-    let config = RunConfig::new(input::scenario("gate").map_err(|error| error.to_string())?);
+pub(super) fn run(args: &CrashArgs) -> Result<(), Failure> {
+    let image = qemu::image(args.image.as_deref(), qemu::FAULTS_IMAGE)
+        .map_err(|error| error.to_string())?;
+    let config = RunConfig::new(input::scenario("gate", &[])?);
     show(
         "planted                pins          reason      fault at    status      mode             torque off\n",
     )?;
@@ -49,7 +46,7 @@ pub(super) fn run(args: &CrashArgs) -> Result<ExitCode, String> {
     if bad {
         return Err("a fault did not end in the safe state".into());
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// One line per fault, and one more per deviation.

@@ -1,13 +1,12 @@
 //! `plant-sim dbc`: the messages for other CAN tools.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use plant_sim::output;
 use trace::dbc;
 
-use super::show;
+use super::{Failure, show};
 
 /// Arguments of `dbc`.
 #[derive(Args)]
@@ -18,11 +17,11 @@ pub(super) struct DbcArgs {
 }
 
 /// Writes the DBC file.
-pub(super) fn run(args: &DbcArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &DbcArgs) -> Result<(), Failure> {
     let text = dbc::generate();
     match &args.out {
-        Some(path) => output::write(path, &text).map_err(|error| error.to_string())?,
+        Some(path) => output::write(path, &text)?,
         None => show(&text)?,
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

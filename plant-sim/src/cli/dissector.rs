@@ -1,13 +1,12 @@
 //! `plant-sim dissector`: the messages for Wireshark.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use plant_sim::output;
 use trace::dissector;
 
-use super::show;
+use super::{Failure, show};
 
 /// Arguments of `dissector`.
 #[derive(Args)]
@@ -18,11 +17,11 @@ pub(super) struct DissectorArgs {
 }
 
 /// Writes the Lua file.
-pub(super) fn run(args: &DissectorArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &DissectorArgs) -> Result<(), Failure> {
     let text = dissector::generate();
     match &args.out {
-        Some(path) => output::write(path, &text).map_err(|error| error.to_string())?,
+        Some(path) => output::write(path, &text)?,
         None => show(&text)?,
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

@@ -2,13 +2,12 @@
 
 use std::io;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use plant_sim::eval::{By, Table, eval};
 use plant_sim::input;
 
-use super::{run, show};
+use super::{Failure, run, show};
 
 /// Arguments of `eval`.
 #[derive(Args)]
@@ -16,9 +15,9 @@ pub(super) struct EvalArgs {
     /// What to compute.
     #[arg(value_enum)]
     table: Table,
-    /// The robot (a model file); default: the IRB 930-22/1.05.
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
+    /// The robot: irb930-22-1.05 (the default), irb930-12-0.85 or a model file.
+    #[arg(long, value_name = "NAME|FILE")]
+    model: Option<String>,
     /// Payload at the flange (a file with mass, com_flange_frame, inertia_com_diag).
     #[arg(long, value_name = "FILE")]
     payload: Option<PathBuf>,
@@ -28,11 +27,11 @@ pub(super) struct EvalArgs {
 }
 
 /// Reads rows from standard input and writes results to standard output; after an error, nothing.
-pub(super) fn run(args: &EvalArgs) -> Result<ExitCode, String> {
-    let model = run::load(args.model.as_ref())?;
+pub(super) fn run(args: &EvalArgs) -> Result<(), Failure> {
+    let model = run::load(args.model.as_deref())?;
     let payload = match &args.payload {
         None => None,
-        Some(path) => Some(input::payload(path).map_err(|error| error.to_string())?),
+        Some(path) => Some(input::payload(path)?),
     };
     let mut output = Vec::new();
     eval(
@@ -43,7 +42,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<ExitCode, String> {
         io::stdin().lock(),
         &mut output,
     )
-    .map_err(|error| format!("standard input: {error}"))?;
+    .map_err(|error| Failure::usage(format!("standard input: {error}")))?;
     show(&String::from_utf8_lossy(&output))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

@@ -1,31 +1,38 @@
 //! The command line: one file per subcommand.
 
 mod arrival;
+mod check;
 mod cost;
 mod crash;
 mod dbc;
 mod dissector;
 mod eval;
+mod failure;
 mod model;
 mod monitor;
+mod pages;
 mod parameters;
 mod record;
 mod report;
 mod run;
-mod signal;
 mod timing;
 mod trace;
 mod what_if;
 
 use std::io::{self, Write as _};
-use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
+
+pub(crate) use failure::Failure;
+
+/// In short what docs/exit-codes.md says.
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 the run or check failed; 2 wrong usage or input; 3 nothing was judged; \
+                          70 a fault of the program itself; 130 ended by a second signal.";
 
 /// Development bench for a SCARA drive cabinet: the cabinet's controller against
 /// a simulated IRB 930, over CAN.
 #[derive(Parser)]
-#[command(name = "plant-sim", version = env!("VERSION_AND_COMMIT"), args_conflicts_with_subcommands = true)]
+#[command(name = "plant-sim", version = env!("VERSION_AND_COMMIT"), args_conflicts_with_subcommands = true, after_help = EXIT_CODES)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -37,6 +44,8 @@ struct Cli {
 enum Command {
     /// Run a scenario (the default command).
     Run(run::RunArgs),
+    /// Check a scenario without running it: what would be refused, how long it takes, what torque it needs.
+    Check(check::CheckArgs),
     /// Count the instructions and the stack that the controller takes on the emulated Cortex-M4F.
     Cost(cost::CostArgs),
     /// Plant faults into the controller on the emulated Cortex-M4F, and see how they end.
@@ -64,14 +73,25 @@ enum Command {
     Dissector(dissector::DissectorArgs),
     /// Write a robot for an external controller (controller --model).
     Model(model::ModelArgs),
+    /// Write a completion script for a shell: plant-sim completions bash > /etc/bash_completion.d/plant-sim.
+    Completions(pages::CompletionsArgs),
+    /// Write the manual page: plant-sim man | man -l -.
+    Man(pages::ManArgs),
 }
 
 /// Executes the command line. An error is one message for the user.
-pub(crate) fn main() -> Result<ExitCode, String> {
-    let cli = Cli::parse();
+pub(crate) fn main() -> u8 {
+    match command(Cli::parse()) {
+        Ok(()) => 0,
+        Err(failure) => failure.report(),
+    }
+}
+
+fn command(cli: Cli) -> Result<(), Failure> {
     match cli.command {
         None => run::run(&cli.run),
         Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Check(args)) => check::run(&args),
         Some(Command::Cost(args)) => cost::run(&args),
         Some(Command::Crash(args)) => crash::run(&args),
         Some(Command::Eval(args)) => eval::run(&args),
@@ -85,14 +105,16 @@ pub(crate) fn main() -> Result<ExitCode, String> {
         Some(Command::Dbc(args)) => dbc::run(&args),
         Some(Command::Dissector(args)) => dissector::run(&args),
         Some(Command::Model(args)) => model::run(&args),
+        Some(Command::Completions(args)) => pages::completions(&args, Cli::command()),
+        Some(Command::Man(args)) => pages::man(&args, Cli::command()),
     }
 }
 
 /// Writes to standard output. A reader that has closed the pipe (`| head`) is not an error.
-fn show(text: &str) -> Result<(), String> {
+fn show(text: &str) -> Result<(), Failure> {
     match io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(format!("cannot write to standard output: {error}"))
+            Err(format!("cannot write to standard output: {error}").into())
         }
         _ => Ok(()),
     }

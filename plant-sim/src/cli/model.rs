@@ -4,7 +4,6 @@
 //! which read back exactly.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use firmware::mechanics::arm::ArmModel;
@@ -12,27 +11,28 @@ use firmware::mechanics::arm::ArmModel;
 use plant_sim::output;
 
 use super::run::load;
-use super::show;
+use super::{Failure, show};
 
 /// Arguments of `model`.
 #[derive(Args)]
 pub(super) struct ModelArgs {
-    /// The robot (a model file); otherwise the built-in IRB 930-22/1.05.
-    file: Option<PathBuf>,
+    /// The robot: irb930-22-1.05 (the default), irb930-12-0.85 or a model file.
+    #[arg(value_name = "NAME|FILE")]
+    robot: Option<String>,
     /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
 /// Writes the robot as JSON.
-pub(super) fn run(args: &ModelArgs) -> Result<ExitCode, String> {
-    let arm = ArmModel::from(&load(args.file.as_ref())?);
+pub(super) fn run(args: &ModelArgs) -> Result<(), Failure> {
+    let arm = ArmModel::from(&load(args.robot.as_deref())?);
     arm.validate()
         .map_err(|error| format!("the controller cannot use this robot: {error}"))?;
     let text = serde_json::to_string_pretty(&arm).map_err(|error| error.to_string())? + "\n";
     match &args.out {
-        Some(path) => output::write(path, &text).map_err(|error| error.to_string())?,
+        Some(path) => output::write(path, &text)?,
         None => show(&text)?,
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

@@ -1,18 +1,18 @@
 //! `plant-sim monitor`: watches a bus on the terminal.
 
 use std::io::{self, IsTerminal};
-use std::process::ExitCode;
 use std::time::{Duration, Instant, SystemTime};
 
 use clap::Args;
 use link::{Link, LinkAddress};
+use plant_sim::interrupt;
 use plant_sim::monitor::{Monitor, Picture, View};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use trace::Interface;
 
+use super::Failure;
 use super::arrival::{microseconds, record};
-use super::signal;
 
 /// Time between two pictures.
 const REFRESH: Duration = Duration::from_millis(100);
@@ -30,32 +30,32 @@ pub(super) struct MonitorArgs {
 }
 
 /// Shows the bus until the user quits.
-pub(super) fn run(args: &MonitorArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &MonitorArgs) -> Result<(), Failure> {
     if !io::stdout().is_terminal() {
-        return Err(
-            "monitor draws on a terminal; use candump and `plant-sim trace` for files".into(),
-        );
+        return Err(Failure::usage(
+            "monitor draws on a terminal; use candump and `plant-sim trace` for files",
+        ));
     }
     let mut link = Link::watch(&args.bus).map_err(|error| error.to_string())?;
     let monitor = Monitor::new(&args.bus.to_string());
-    signal::end_on_signal()?;
+    interrupt::listen()?;
     // Also restores the terminal in a panic.
     let mut terminal = ratatui::init();
     let result = watch(&mut link, monitor, &mut terminal);
     ratatui::restore();
-    result.map(|()| ExitCode::SUCCESS)
+    result
 }
 
 fn watch(
     link: &mut Link,
     mut monitor: Monitor,
     terminal: &mut DefaultTerminal,
-) -> Result<(), String> {
-    let on_screen = |error: io::Error| format!("cannot use the terminal: {error}");
+) -> Result<(), Failure> {
+    let on_screen = |error: io::Error| Failure::failed(format!("cannot use the terminal: {error}"));
     let mut view = View::default();
     let mut drawn: Option<Instant> = None;
     let mut held: Option<Picture> = None;
-    while !signal::has_come() {
+    while !interrupt::asked() {
         link.wait(WAIT).map_err(|error| error.to_string())?;
         for _ in 0..BATCH {
             let Some(arrival) = link.next_arrival() else {

@@ -1,13 +1,12 @@
 //! `plant-sim parameters`: lists and sets parameters over the bus.
 
-use std::process::ExitCode;
-
 use clap::{Args, ValueEnum};
 use link::LinkAddress;
 use plant_sim::parameters::{self, Assignment, Client, ClientError, Reading};
+use plant_sim::say;
 use protocol::messages::Server;
 
-use super::show;
+use super::{Failure, show};
 
 /// Arguments of `parameters`.
 #[derive(Args)]
@@ -37,10 +36,10 @@ enum ServerChoice {
 }
 
 /// Lists or sets parameters.
-pub(super) fn run(args: &ParametersArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &ParametersArgs) -> Result<(), Failure> {
     let Some(bus) = &args.bus else {
         show(&parameters::markdown())?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(());
     };
     let mut client = Client::connect(bus).map_err(|error| error.to_string())?;
     let mut readings = Vec::new();
@@ -58,7 +57,7 @@ pub(super) fn run(args: &ParametersArgs) -> Result<ExitCode, String> {
         })?;
     }
     result.map_err(|error| error.to_string())?;
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn list(
@@ -73,7 +72,7 @@ fn list(
         match client.list(Server::Drives) {
             // A controller may be configured before its drives are present.
             Err(error @ ClientError::DrivesSilent { .. }) if server.is_none() => {
-                eprintln!("plant-sim: {error}");
+                say!("plant-sim: {error}");
             }
             listed => readings.extend(listed?),
         }

@@ -1,15 +1,15 @@
 //! `plant-sim record`: records a bus into files.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use link::{Link, LinkAddress};
 use plant_sim::record::{RecordError, Recording};
+use plant_sim::{interrupt, say};
 use trace::Interface;
 
-use super::{arrival, show, signal};
+use super::{Failure, arrival, show};
 
 /// Longest wait for a frame before checking for signals; also the time between two flushes.
 const WAIT: Duration = Duration::from_millis(100);
@@ -34,15 +34,15 @@ pub(super) struct RecordArgs {
 }
 
 /// Records until a signal arrives.
-pub(super) fn run(args: &RecordArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &RecordArgs) -> Result<(), Failure> {
     let failed = |error: RecordError| error.to_string();
     let mut recording = Recording::create(&args.out, args.rotate).map_err(failed)?;
-    signal::end_on_signal()?;
+    interrupt::listen()?;
     let begun = Instant::now();
     let ended = Link::watch(&args.bus)
         .map_err(|error| error.to_string())
         .and_then(|mut link| {
-            eprintln!("plant-sim: recording {}; Ctrl-C ends it", args.bus);
+            say!("plant-sim: recording {}; Ctrl-C ends it", args.bus);
             record(&mut link, &args.bus, &mut recording)
         });
     // However it ended, the recording gets its name.
@@ -57,19 +57,19 @@ pub(super) fn run(args: &RecordArgs) -> Result<ExitCode, String> {
         recorded.files,
     ))?;
     if lost > 0 {
-        return Err(format!(
+        return Err(Failure::failed(format!(
             "{}: {lost} frames are not in the recording: they came faster than they were read, or could not be read",
             args.bus
-        ));
+        )));
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// Records until a signal arrives or the bus is gone; returns the number of frames lost.
 fn record(link: &mut Link, bus: &LinkAddress, recording: &mut Recording) -> Result<u64, String> {
     let interface = interface(bus);
     let mut flushed = Instant::now();
-    while !signal::has_come() {
+    while !interrupt::asked() {
         let alive = link.wait(WAIT);
         take(link, interface, recording)?;
         alive.map_err(|error| error.to_string())?;

@@ -1,12 +1,11 @@
 //! `plant-sim report`: two runs on one page.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use plant_sim::{output, report};
 
-use super::show;
+use super::{Failure, show};
 
 /// Arguments of `report`.
 #[derive(Args)]
@@ -21,9 +20,9 @@ pub(super) struct ReportArgs {
 }
 
 /// Writes the page about both.
-pub(super) fn run(args: &ReportArgs) -> Result<ExitCode, String> {
-    let page = report::compare([&args.one, &args.other]).map_err(|error| error.to_string())?;
-    output::write(&args.out, &page).map_err(|error| error.to_string())?;
+pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
+    let page = report::compare([&args.one, &args.other]).map_err(Failure::usage)?;
+    output::write(&args.out, &page)?;
     show(&format!("{}\n", args.out.display()))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

@@ -1,7 +1,6 @@
 //! `plant-sim timing`: timing of the loop on this machine and this bus.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
@@ -10,7 +9,7 @@ use plant_sim::external::{histogram, measure};
 use plant_sim::output;
 use sim::scenario;
 
-use super::show;
+use super::{Failure, show};
 
 /// Arguments of `timing`.
 #[derive(Args)]
@@ -31,13 +30,14 @@ pub(super) struct TimingArgs {
 }
 
 /// Measures, prints percentiles and margins, draws the histogram.
-pub(super) fn run(args: &TimingArgs) -> Result<ExitCode, String> {
-    scenario::check_rate(args.rate)
-        .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
+pub(super) fn run(args: &TimingArgs) -> Result<(), Failure> {
+    scenario::check_rate(args.rate).map_err(|allowed| {
+        Failure::usage(format!("--rate is {}; allowed: {allowed}", args.rate))
+    })?;
     let time = Duration::from_secs(args.seconds.into());
     let timing = measure(&args.bus, args.rate, time).map_err(|error| error.to_string())?;
-    output::write(&args.svg, &histogram(&timing)).map_err(|error| error.to_string())?;
+    output::write(&args.svg, &histogram(&timing))?;
     show(&timing.report())?;
     show(&format!("histogram in {}\n", args.svg.display()))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

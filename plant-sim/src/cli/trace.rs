@@ -8,10 +8,10 @@ mod sink;
 mod source;
 
 use std::io::{self, Write};
-use std::process::ExitCode;
 
 use clap::Subcommand;
 use firmware::mechanics::arm::ArmModel;
+use plant_sim::interrupt;
 use plant_sim::plot::{Plot, page};
 use trace::convert::Converter;
 use trace::decode::{Decoder, Format};
@@ -19,8 +19,7 @@ use trace::stats::Gatherer;
 use trace::{Interface, Record};
 
 use super::run::load;
-use super::show;
-use super::signal::end_on_signal;
+use super::{Failure, show};
 use args::{CheckArgs, ConvertArgs, DecodeArgs, FormatChoice, PlotArgs, ReplayArgs, StatsArgs};
 use sink::{Records, each, refuse_same, written};
 use source::Source;
@@ -43,7 +42,7 @@ pub(super) enum TraceCommand {
 }
 
 /// Executes the subcommand.
-pub(super) fn run(command: &TraceCommand) -> Result<ExitCode, String> {
+pub(super) fn run(command: &TraceCommand) -> Result<(), Failure> {
     match command {
         TraceCommand::Decode(args) => decode(args),
         TraceCommand::Stats(args) => stats(args),
@@ -54,14 +53,14 @@ pub(super) fn run(command: &TraceCommand) -> Result<ExitCode, String> {
     }
 }
 
-fn decode(args: &DecodeArgs) -> Result<ExitCode, String> {
+fn decode(args: &DecodeArgs) -> Result<(), Failure> {
     let format = match args.format {
         FormatChoice::Text => Format::Text,
         FormatChoice::Csv => Format::Csv,
         FormatChoice::Jsonl => Format::JsonLines,
     };
     refuse_same(&args.input.file, args.out.as_deref())?;
-    end_on_signal()?;
+    interrupt::listen()?;
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     written(args.out.as_deref(), |sink| {
         let mut decoder = Decoder::new(sink, format)?;
@@ -71,10 +70,10 @@ fn decode(args: &DecodeArgs) -> Result<ExitCode, String> {
     source.verdict()
 }
 
-fn convert(args: &ConvertArgs) -> Result<ExitCode, String> {
-    let (target, end) = args.goals()?;
+fn convert(args: &ConvertArgs) -> Result<(), Failure> {
+    let (target, end) = args.goals().map_err(Failure::usage)?;
     refuse_same(&args.input.file, args.out.as_deref())?;
-    end_on_signal()?;
+    interrupt::listen()?;
     let mut source = Source::open(&args.input.file, args.input.selection(end))?;
     written(args.out.as_deref(), |sink| {
         let mut converter = Converter::new(sink, target)?;
@@ -104,8 +103,8 @@ impl<W: Write> Records for Converter<W> {
     }
 }
 
-fn stats(args: &StatsArgs) -> Result<ExitCode, String> {
-    end_on_signal()?;
+fn stats(args: &StatsArgs) -> Result<(), Failure> {
+    interrupt::listen()?;
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     let mut gatherer = Gatherer::new(args.bitrate);
     if let Some(longest) = args.skip_gaps {
@@ -127,10 +126,10 @@ fn stats(args: &StatsArgs) -> Result<ExitCode, String> {
     source.verdict()
 }
 
-fn plot(args: &PlotArgs) -> Result<ExitCode, String> {
+fn plot(args: &PlotArgs) -> Result<(), Failure> {
     refuse_same(&args.input.file, args.out.as_deref())?;
-    end_on_signal()?;
-    let arm = ArmModel::from(&load(args.model.as_ref())?);
+    interrupt::listen()?;
+    let arm = ArmModel::from(&load(args.model.as_deref())?);
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     let title = args.input.file.display().to_string();
     let mut plots: Vec<(Interface, Plot)> = Vec::new();
@@ -146,7 +145,7 @@ fn plot(args: &PlotArgs) -> Result<ExitCode, String> {
     plots.retain(|(_, plot)| !plot.is_empty());
     if plots.is_empty() {
         source.verdict()?;
-        return Ok(source.nothing("the log has no frame of this protocol that can be drawn"));
+        return Err(source.nothing("the log has no frame of this protocol that can be drawn"));
     }
     let plots: Vec<Plot> = plots.into_iter().map(|(_, plot)| plot).collect();
     written(args.out.as_deref(), |sink| {

@@ -2,12 +2,11 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use plant_sim::{output, report};
 
-use super::show;
+use super::{Failure, show};
 
 /// First bytes of every WebAssembly module.
 const MAGIC: &[u8] = b"\0asm";
@@ -23,16 +22,16 @@ pub(super) struct WhatIfArgs {
 }
 
 /// Writes the page.
-pub(super) fn run(args: &WhatIfArgs) -> Result<ExitCode, String> {
+pub(super) fn run(args: &WhatIfArgs) -> Result<(), Failure> {
     let path = args.module.display();
-    let module =
-        fs::read(&args.module).map_err(|error| format!("{path}: cannot be read: {error}"))?;
+    let module = fs::read(&args.module)
+        .map_err(|error| Failure::usage(format!("{path}: cannot be read: {error}")))?;
     if !module.starts_with(MAGIC) {
-        return Err(format!(
+        return Err(Failure::usage(format!(
             "{path}: not a WebAssembly module; plant-sim/web/build builds it and the page"
-        ));
+        )));
     }
-    output::write(&args.out, &report::what_if(&module)).map_err(|error| error.to_string())?;
+    output::write(&args.out, &report::what_if(&module))?;
     show(&format!("{}\n", args.out.display()))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

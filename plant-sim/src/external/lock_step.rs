@@ -16,6 +16,7 @@ use sim::world::World;
 
 use super::peers::{self, sender};
 use super::{ANSWER_LIMIT, Remote};
+use crate::say;
 use crate::twin::Twin;
 
 /// A controller behind a link, in lock-step with the rig.
@@ -117,8 +118,8 @@ impl LockStep {
             let left = limit.saturating_duration_since(time::Instant::now());
             if left.is_zero() || self.remote.lost.is_some() {
                 if self.follows && self.remote.lost.is_none() {
-                    eprintln!(
-                        "plant-sim: the controller on {} is late {}: no answer to {frame} within {} s; continuing",
+                    say!(
+                        "plant-sim: the controller on {} is late {}: no answer to {frame} within {} s; going on",
                         self.remote.bus,
                         self.place(),
                         ANSWER_LIMIT.as_secs()

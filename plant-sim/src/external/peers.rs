@@ -10,6 +10,8 @@ use protocol::messages::{Message, Nmt, Node as Name};
 use protocol::table;
 
 use super::Remote;
+use crate::interrupt;
+use crate::say;
 use sim::peer::PeerError;
 
 /// Time to listen on a bus before taking part: longer than the interval between two frames of a waiting plant.
@@ -51,17 +53,20 @@ pub(crate) fn meet(address: &LinkAddress) -> Result<Remote, PeerError> {
             // sample.
             remote.send(&reset());
             if told {
-                eprintln!("plant-sim: the controller is present");
+                say!("plant-sim: the controller is there");
             }
             remote.met = true;
             return Ok(remote);
+        }
+        if interrupt::asked() {
+            return Err(remote.error(format!("did not appear: {}", interrupt::error())));
         }
         if began.elapsed() > MEET_LIMIT {
             return Err(remote.error(format!("did not appear within {} s", MEET_LIMIT.as_secs())));
         }
         if !told {
             told = true;
-            eprintln!(
+            say!(
                 "plant-sim: waiting for a controller; start it with: controller --bus {}",
                 remote.bus
             );

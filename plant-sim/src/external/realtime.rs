@@ -18,6 +18,7 @@ use trace::difference::Difference;
 
 use super::peers::{self, sender};
 use super::{Remote, WallClock};
+use crate::say;
 use crate::twin::Twin;
 
 /// Commands of the twin that are kept for comparison; later commands are not compared.
@@ -54,7 +55,7 @@ impl RealTime {
     ) -> Result<Self, PeerError> {
         let remote = peers::meet(address)?;
         for refused in claim() {
-            eprintln!("plant-sim: {refused}");
+            say!("plant-sim: {refused}");
         }
         Ok(Self {
             remote,
@@ -104,7 +105,7 @@ impl RealTime {
             && let Some(difference) = Difference::between(Some(due), Some(frame))
         {
             if self.different == 0 {
-                eprintln!(
+                say!(
                     "plant-sim: a command differs from that of the twin in this process: {difference}"
                 );
             }

@@ -7,6 +7,7 @@
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::Arc;
@@ -21,11 +22,10 @@ use firmware::cabinet::reset::Stop;
 use protocol::frame::CanFrame;
 
 use super::failure;
+use super::image::{EMULATOR, no_emulator};
 use super::serial::Serial;
 use super::supervise::{Ended, Watch, supervise};
 use sim::peer::PeerError;
-
-const EMULATOR: &str = "qemu-system-arm";
 
 /// With `-icount shift=N` an instruction takes 2^N ns of emulated time; at 10, calls of up to 655 000 instructions fit
 /// SysTick's 24 bits.
@@ -88,6 +88,8 @@ impl Board {
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-kernel")
             .arg(&image)
+            // A Ctrl-C on the terminal is for the run, which ends the emulation when it is through.
+            .process_group(0)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
@@ -111,13 +113,7 @@ impl Board {
             }
         };
         command.args(["-serial", &format!("file:{LOG}")]);
-        let mut child = command.spawn().map_err(|error| {
-            failure(if error.kind() == io::ErrorKind::NotFound {
-                format!("needs {EMULATOR}; install it: apt-get install qemu-system-arm")
-            } else {
-                format!("cannot be started: {EMULATOR}: {error}")
-            })
-        })?;
+        let mut child = command.spawn().map_err(|error| no_emulator(&error))?;
         let requests = child.stdin.take();
         let replies = child
             .stdout

@@ -1,5 +1,7 @@
-//! Finds the image by building it: an up-to-date build takes a moment, and a stale image is never run.
+//! The emulator and the image that it runs. The image is found by building it: an up-to-date build takes a moment, and a
+//! stale image is never run.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -8,11 +10,38 @@ use sim::peer::PeerError;
 
 const PACKAGE: &str = "mps2-an386";
 
-/// Builds an image of the board from the sources; returns its path.
+/// The emulator.
+pub(super) const EMULATOR: &str = "qemu-system-arm";
+
+/// The image to run: the one that was named, or else `program` of the board's package, built from the sources.
 ///
 /// # Errors
-/// It cannot be built; the error says what to do.
-pub fn build(program: &str) -> Result<PathBuf, PeerError> {
+/// The emulator is missing, which is found out before anything is built, or the image cannot be built; each with what to do
+/// about it.
+pub fn image(named: Option<&Path>, program: &str) -> Result<PathBuf, PeerError> {
+    find()?;
+    named.map_or_else(|| build(program), |named| Ok(named.into()))
+}
+
+fn find() -> Result<(), PeerError> {
+    Command::new(EMULATOR)
+        .arg("--version")
+        .stdout(Stdio::null())
+        .status()
+        .map(drop)
+        .map_err(|error| no_emulator(&error))
+}
+
+/// That the emulator cannot be started.
+pub(super) fn no_emulator(error: &io::Error) -> PeerError {
+    failure(if error.kind() == io::ErrorKind::NotFound {
+        format!("needs {EMULATOR}; install it: apt-get install qemu-system-arm")
+    } else {
+        format!("cannot be started: {EMULATOR}: {error}")
+    })
+}
+
+fn build(program: &str) -> Result<PathBuf, PeerError> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/board/cargo");
     if !script.exists() {
         return Err(failure(format!(

@@ -2,10 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use protocol::parameters::ControllerParameter as Parameter;
 use toml::de::{DeTable, DeValue};
 
-use super::{Jump, Line, MAX_CYCLES, PayloadSpec, Scenario, ScenarioError, Step, check_rate};
+use super::{
+    Jump, Line, MAX_CYCLES, PayloadSpec, Place, Scenario, ScenarioError, Step, check_rate,
+};
 use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
 use crate::model::RobotModel;
 use crate::text;
@@ -49,11 +50,7 @@ impl Scenario {
     pub fn check_with(&self, robot: &RobotModel) -> Result<(), ScenarioError> {
         if let Some(gains) = &self.gains {
             let period = (1.0 / self.rate_hz) as f32;
-            for (key, value, parameter) in [
-                ("gains.bandwidth", gains.bandwidth, Parameter::Bandwidth),
-                ("gains.damping", gains.damping, Parameter::Damping),
-                ("gains.observer", gains.observer, Parameter::Observer),
-            ] {
+            for (key, parameter, value) in gains.each(period) {
                 let rule = parameter.rule();
                 rule.check(value as f32, period).map_err(|_| {
                     let (lower, upper) = (rule.lower, rule.upper_at(period));
@@ -174,10 +171,20 @@ impl Scenario {
             .map_err(|allowed| self.wrong(key, value, allowed))
     }
 
+    /// Where the value under a key is said; the last change counts.
+    fn place(&self, key: &str) -> Place {
+        let change = self.changes.iter().rev().find(|change| change.is_of(key));
+        match change {
+            Some(change) => Place::Change(change.said.clone()),
+            None => place(&self.source.text, key)
+                .map_or(Place::Default, |(line, column)| Place::Text(line, column)),
+        }
+    }
+
     fn wrong(&self, key: &str, value: impl ToString, allowed: impl Into<String>) -> ScenarioError {
         ScenarioError::Value {
             origin: self.source.origin.clone(),
-            place: place(&self.source.text, key),
+            place: self.place(key),
             key: key.into(),
             value: value.to_string(),
             allowed: allowed.into(),
@@ -185,8 +192,7 @@ impl Scenario {
     }
 }
 
-/// Line and column of the value under a key such as `cycle[2].jump.to[0]`, if it is in the text;
-/// defaults and command-line values are not.
+/// Line and column of the value under a key such as `cycle[2].jump.to[0]`, if it is in the text: a default is not.
 fn place(toml: &str, key: &str) -> Option<(usize, usize)> {
     let document = DeTable::parse(toml).ok()?;
     let mut at = document.span();

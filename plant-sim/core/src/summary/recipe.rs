@@ -1,6 +1,5 @@
 //! What was run, with everything needed to run it again.
 
-use firmware::control::laws::Gains;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use trace::LogHash;
@@ -63,14 +62,10 @@ impl Recipe {
             scenario_text: scenario.to_toml(),
             law: scenario.law.to_string(),
             rate_hz: scenario.rate_hz,
-            gains: scenario.gains.unwrap_or_else(|| {
-                let gains = Gains::for_period((1.0 / scenario.rate_hz) as f32);
-                GainsSpec {
-                    bandwidth: gains.bandwidth.into(),
-                    damping: gains.damping.into(),
-                    observer: gains.observer.into(),
-                }
-            }),
+            gains: scenario
+                .gains
+                .unwrap_or_default()
+                .resolved((1.0 / scenario.rate_hz) as f32),
             payload_kg: scenario.payload.map_or(0.0, |payload| payload.mass),
             payload: scenario.payload,
             mismatch: scenario.mismatch,

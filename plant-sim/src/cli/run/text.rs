@@ -48,16 +48,16 @@ pub(super) fn report(results: &Results, config: &RunConfig, out: &Path) -> Strin
         results.wall_time_s,
         results.real_time_factor
     );
-    line!(
-        text,
-        "  {}trace.log, truth.csv, summary.json in {}",
-        if out.join(FILE).exists() {
-            "report.html to look at, "
-        } else {
-            ""
-        },
-        out.display()
-    );
+    let page = if out.join(FILE).exists() {
+        "report.html to look at, "
+    } else {
+        ""
+    };
+    let files = match &results.trace_sha256 {
+        Some(_) => "trace.log, truth.csv, summary.json",
+        None => "summary.json",
+    };
+    line!(text, "  {page}{files} in {}", out.display());
     text
 }
 

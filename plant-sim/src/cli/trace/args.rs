@@ -139,9 +139,9 @@ pub(crate) struct PlotArgs {
     pub input: InputArgs,
     #[command(flatten)]
     pub end: EndArgs,
-    /// The robot (a model file); turns encoder counts into joint positions.
-    #[arg(long, value_name = "FILE")]
-    pub model: Option<PathBuf>,
+    /// The robot (a name or a model file, as for run); turns encoder counts into joint positions.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub model: Option<String>,
     /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -155,9 +155,9 @@ pub(crate) struct CheckArgs {
     pub input: InputArgs,
     #[command(flatten)]
     pub end: EndArgs,
-    /// The robot (a model file); its motors limit the torque.
-    #[arg(long, value_name = "FILE")]
-    pub model: Option<PathBuf>,
+    /// The robot (a name or a model file, as for run); its motors limit the torque.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub model: Option<String>,
 }
 
 /// Arguments of `replay`.
@@ -169,9 +169,9 @@ pub(crate) struct ReplayArgs {
     pub input: InputArgs,
     #[command(flatten)]
     pub end: EndArgs,
-    /// The robot as the recorded controller knew it (a model file).
-    #[arg(long, value_name = "FILE", conflicts_with = "bus")]
-    pub model: Option<PathBuf>,
+    /// The robot as the recorded controller knew it (a name or a model file, as for run).
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "bus")]
+    pub model: Option<String>,
     /// Control rate of the recorded controller.
     #[arg(
         long,

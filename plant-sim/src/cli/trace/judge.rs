@@ -2,14 +2,15 @@
 //! bus.
 
 use std::collections::BTreeMap;
-use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use firmware::mechanics::arm::ArmModel;
 use link::{Link, LinkAddress, SlcanPeer};
 use plant_sim::check::{Checker, Counts};
+use plant_sim::interrupt;
 use plant_sim::play::{Pace, PlayError, Player};
 use plant_sim::replay::Replay;
+use plant_sim::say;
 use protocol::time::Period;
 use sim::model::RobotModel;
 use sim::rig::RigConfig;
@@ -19,8 +20,7 @@ use trace::Interface;
 use super::args::{CheckArgs, ReplayArgs};
 use super::source::Source;
 use crate::cli::run::load;
-use crate::cli::show;
-use crate::cli::signal::end_on_signal;
+use crate::cli::{Failure, show};
 
 /// A wait of the player worth mentioning.
 const LONG: Duration = Duration::from_secs(1);
@@ -37,9 +37,9 @@ fn place<T>(source: &Source, interface: Interface, all: &PerInterface<T>) -> Str
     }
 }
 
-pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, String> {
-    end_on_signal()?;
-    let arm = ArmModel::from(&load(args.model.as_ref())?);
+pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
+    interrupt::listen()?;
+    let arm = ArmModel::from(&load(args.model.as_deref())?);
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     let mut checkers: PerInterface<Checker> = BTreeMap::new();
     let mut counts = Counts::default();
@@ -58,25 +58,26 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, String> {
             })?;
         }
     }
-    let verdict = source.verdict()?;
+    source.verdict()?;
     if counts.judged == 0 {
-        return Ok(source.nothing("the log has no frame of this protocol"));
+        return Err(source.nothing("the log has no frame of this protocol"));
     }
     show(&format!(
         "{} frames keep every rule; {} foreign frames and {} error frames are not judged\n",
         counts.judged, counts.foreign, counts.error_frames
     ))?;
-    Ok(verdict)
+    Ok(())
 }
 
-pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
+pub(super) fn replay(args: &ReplayArgs) -> Result<(), Failure> {
     if let Some(bus) = &args.bus {
         return play(args, bus);
     }
-    end_on_signal()?;
-    scenario::check_rate(args.rate)
-        .map_err(|allowed| format!("--rate is {}; allowed: {allowed}", args.rate))?;
-    let model: RobotModel = load(args.model.as_ref())?;
+    interrupt::listen()?;
+    scenario::check_rate(args.rate).map_err(|allowed| {
+        Failure::usage(format!("--rate is {}; allowed: {allowed}", args.rate))
+    })?;
+    let model: RobotModel = load(args.model.as_deref())?;
     let config = RigConfig {
         nominal: ArmModel::from(&model),
         actual: model,
@@ -101,23 +102,23 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, String> {
             })?;
         }
     }
-    let verdict = source.verdict()?;
+    source.verdict()?;
     if compared == 0 {
-        return Ok(source.nothing("the log has no command of a controller"));
+        return Err(source.nothing("the log has no command of a controller"));
     }
     show(&format!(
         "{compared} commands are the same, byte for byte\n"
     ))?;
-    Ok(verdict)
+    Ok(())
 }
 
-fn play(args: &ReplayArgs, bus: &LinkAddress) -> Result<ExitCode, String> {
+fn play(args: &ReplayArgs, bus: &LinkAddress) -> Result<(), Failure> {
     let mut source = Source::open(&args.input.file, args.input.selection(args.end.to))?;
     let link = Link::open(bus).map_err(|error| error.to_string())?;
     let mut player = Player::new(link, Pace::new(args.speed, args.skip_gaps));
     let failed = |error: PlayError| format!("{bus}: {error}");
     if let LinkAddress::Slcan(SlcanPeer::Listen(_)) = bus {
-        eprintln!("plant-sim: waiting for a client on {bus}");
+        say!("plant-sim: waiting for a client on {bus}");
         player.wait_for_client().map_err(failed)?;
     }
     let begun = Instant::now();
@@ -126,14 +127,14 @@ fn play(args: &ReplayArgs, bus: &LinkAddress) -> Result<ExitCode, String> {
         if !interfaces.contains(&record.interface) {
             interfaces.push(record.interface);
             if let [first, second] = interfaces.as_slice() {
-                eprintln!(
-                    "plant-sim: frames of {first} and {second} go onto one bus; select one with --interface"
+                say!(
+                    "plant-sim: frames of {first} and {second} go onto one bus; --interface chooses"
                 );
             }
         }
         let wait = player.wait(record.time_us);
         if wait > LONG {
-            eprintln!(
+            say!(
                 "plant-sim: {}: {:.3} s until the next frame; --skip-gaps leaves such waits out",
                 source.place(),
                 wait.as_secs_f64()
@@ -144,7 +145,7 @@ fn play(args: &ReplayArgs, bus: &LinkAddress) -> Result<ExitCode, String> {
             .map_err(|error| format!("{}: {}", source.place(), failed(error)))?;
     }
     let played = player.finish().map_err(failed)?;
-    let verdict = source.verdict()?;
+    source.verdict()?;
     show(&format!(
         "{} frames played onto {bus} in {:.3} s; {} had to wait for room in the queue, {} error frames left out\n",
         played.frames,
@@ -153,10 +154,10 @@ fn play(args: &ReplayArgs, bus: &LinkAddress) -> Result<ExitCode, String> {
         played.left_out,
     ))?;
     if played.lost > 0 {
-        return Err(format!(
+        return Err(Failure::failed(format!(
             "{bus}: {} frames were refused or not read at the other end",
             played.lost
-        ));
+        )));
     }
-    Ok(verdict)
+    Ok(())
 }

@@ -8,6 +8,8 @@ use std::path::Path;
 use plant_sim::output;
 use trace::Record;
 
+use crate::cli::Failure;
+
 use super::source::{Source, input};
 
 /// Writes every selected record as it arrives.
@@ -29,7 +31,7 @@ pub(super) fn each(source: &mut Source, sink: &mut impl Records) -> io::Result<(
 }
 
 /// Refuses an output that is the input.
-pub(super) fn refuse_same(file: &Path, out: Option<&Path>) -> Result<(), String> {
+pub(super) fn refuse_same(file: &Path, out: Option<&Path>) -> Result<(), Failure> {
     let Some(out) = out else {
         return Ok(());
     };
@@ -40,10 +42,10 @@ pub(super) fn refuse_same(file: &Path, out: Option<&Path>) -> Result<(), String>
     if let (Ok(file), Ok(other)) = data
         && (file.dev(), file.ino()) == (other.dev(), other.ino())
     {
-        return Err(format!(
+        return Err(Failure::usage(format!(
             "--out {} is the trace itself; name another file",
             out.display()
-        ));
+        )));
     }
     Ok(())
 }
@@ -53,12 +55,12 @@ pub(super) fn refuse_same(file: &Path, out: Option<&Path>) -> Result<(), String>
 pub(super) fn written(
     out: Option<&Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), String> {
+) -> Result<(), Failure> {
     let Some(path) = out else {
         let mut sink = BufWriter::with_capacity(1 << 16, io::stdout().lock());
         return match write(&mut sink).and_then(|()| sink.flush()) {
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-                Err(format!("cannot write to standard output: {error}"))
+                Err(format!("cannot write to standard output: {error}").into())
             }
             _ => {
                 // What is left in the buffer has no reader any more.
@@ -67,7 +69,7 @@ pub(super) fn written(
             }
         };
     };
-    let mut file = output::File::create(path).map_err(|error| error.to_string())?;
+    let mut file = output::File::create(path)?;
     write(&mut file).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
-    file.persist().map_err(|error| error.to_string())
+    Ok(file.persist()?)
 }

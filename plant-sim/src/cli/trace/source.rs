@@ -5,16 +5,16 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::os::fd::AsFd;
 use std::path::Path;
-use std::process::ExitCode;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use flate2::read::MultiGzDecoder;
+use plant_sim::{interrupt, say};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use trace::select::Selection;
 use trace::{Problem, ReadError, Reader, Record};
 
-use crate::cli::signal;
+use crate::cli::Failure;
 
 /// Unreadable lines that are shown; of further ones only the number is.
 const SHOWN: u64 = 10;
@@ -27,9 +27,6 @@ const WATCH: Timespec = Timespec {
 };
 /// First bytes of gzip.
 const GZIP: &[u8] = b"\x1F\x8B";
-/// Exit code if there was nothing to judge: neither good (0) nor bad (1).
-const NOTHING_JUDGED: u8 = 3;
-
 /// A trace that is read from front to end, with its progress on standard error.
 pub(super) struct Source {
     name: String,
@@ -56,7 +53,7 @@ struct Counted {
 impl Read for Counted {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
-            if signal::has_come() {
+            if interrupt::asked() {
                 return Ok(0);
             }
             let mut input = [PollFd::new(&self.input, PollFlags::IN)];
@@ -73,16 +70,19 @@ impl Read for Counted {
 }
 
 impl Source {
-    pub(super) fn open(path: &Path, selection: Selection) -> Result<Self, String> {
+    pub(super) fn open(path: &Path, selection: Selection) -> Result<Self, Failure> {
         let mut name = path.display().to_string();
-        let failed = |error: io::Error| format!("cannot read {}: {error}", path.display());
+        let failed =
+            |error: io::Error| Failure::usage(format!("cannot read {}: {error}", path.display()));
         let input = input(path).map_err(failed)?;
         if path == Path::new("-") {
             name = "standard input".into();
         }
         let data = input.metadata().map_err(failed)?;
         if data.is_dir() {
-            return Err(format!("cannot read {name}: it is a folder"));
+            return Err(Failure::usage(format!(
+                "cannot read {name}: it is a folder"
+            )));
         }
         let bytes = Rc::new(Cell::new(0));
         let mut input = Counted {
@@ -130,12 +130,12 @@ impl Source {
                         return Some(Ok(record));
                     }
                 }
-                Err(_) if signal::has_come() => return None,
+                Err(_) if interrupt::asked() => return None,
                 Err(ReadError::Line {
                     problem: problem @ Problem::Unterminated,
                     ..
                 }) => {
-                    eprintln!("plant-sim: {}: {problem}; it is left out", self.place());
+                    say!("plant-sim: {}: {problem}; it is left out", self.place());
                 }
                 Err(ReadError::Line { problem, .. }) => return Some(Err(problem)),
                 Err(error @ ReadError::Io { .. }) => {
@@ -154,7 +154,7 @@ impl Source {
                 Err(problem) => {
                     self.unreadable += 1;
                     if self.unreadable <= SHOWN {
-                        eprintln!("plant-sim: {}: {problem}", self.place());
+                        say!("plant-sim: {}: {problem}", self.place());
                     }
                 }
             }
@@ -188,32 +188,29 @@ impl Source {
     }
 
     /// Success only if the trace was not empty and every line could be read.
-    pub(super) fn verdict(&self) -> Result<ExitCode, String> {
+    pub(super) fn verdict(&self) -> Result<(), Failure> {
         if let Some(failure) = &self.failure {
-            return Err(failure.clone());
+            return Err(failure.clone().into());
         }
         match self.unreadable {
-            0 if self.selected == 0 => Ok(self.nothing("the log is empty")),
-            0 => Ok(ExitCode::SUCCESS),
-            lines => Err(format!(
+            0 if self.selected == 0 => Err(self.nothing("the log is empty")),
+            0 => Ok(()),
+            lines => Err(Failure::failed(format!(
                 "{}: {lines} lines could not be read, {} could",
                 self.name, self.records
-            )),
+            ))),
         }
     }
 
     /// Reports that nothing was judged, and why: the selection is empty, or `what`.
-    pub(super) fn nothing(&self, what: &str) -> ExitCode {
+    pub(super) fn nothing(&self, what: &str) -> Failure {
         let name = &self.name;
         match (self.selected, self.records) {
-            (0, records @ 1..) => {
-                eprintln!(
-                    "plant-sim: {name}: nothing judged: none of {records} records is selected"
-                );
-            }
-            _ => eprintln!("plant-sim: {name}: nothing judged: {what}"),
+            (0, records @ 1..) => Failure::nothing_judged(format!(
+                "{name}: nothing judged: none of {records} records is selected"
+            )),
+            _ => Failure::nothing_judged(format!("{name}: nothing judged: {what}")),
         }
-        ExitCode::from(NOTHING_JUDGED)
     }
 
     fn progress(&mut self) {
@@ -224,7 +221,7 @@ impl Source {
         let share = self.size.map_or(String::new(), |size| {
             format!(" ({:.0} %)", self.bytes.get() as f64 / size as f64 * 100.0)
         });
-        eprintln!("{}: {} frames{share}", self.name, self.records);
+        say!("{}: {} frames{share}", self.name, self.records);
     }
 }
 

@@ -1,0 +1,125 @@
+//! What a person reads when the controller refuses a request: reason, axis, parameter, value and what is allowed.
+
+use protocol::messages::{MotionRequest, Refusal, RefusalReason};
+
+/// Joints in order, with the units of their positions and efforts.
+const AXES: [(&str, &str, &str); 4] = [
+    ("shoulder", "rad", "N m"),
+    ("elbow", "rad", "N m"),
+    ("lift", "m", "N"),
+    ("wrist", "rad", "N m"),
+];
+
+/// The refusal as a sentence.
+pub(crate) fn sentence(request: &MotionRequest, refusal: &Refusal) -> String {
+    let mut text = refusal.reason.describe().trim_end_matches('.').to_owned();
+    let axis = AXES.get(usize::from(refusal.axis));
+    if let Some((name, ..)) = axis {
+        text += &format!("; axis {name}");
+    }
+    let (value, limit) = (refusal.value, refusal.limit);
+    match (parameter(request, refusal), unit(request, refusal)) {
+        // Such a refusal has no numbers.
+        (None, None) => {}
+        (Some(parameter), None) => text += &format!("; parameter {parameter}"),
+        (Some("top"), Some(unit)) if value < 0.0 => {
+            text += &format!(
+                "; parameter top is {} {unit} below the start or the end of the jump, allowed: not below either",
+                -value
+            );
+        }
+        (parameter, Some(unit)) => {
+            let parameter =
+                parameter.map_or_else(String::new, |name| format!("parameter {name}: "));
+            let space = if unit.is_empty() { "" } else { " " };
+            text += &format!("; {parameter}{value}{space}{unit}, limit {limit}{space}{unit}");
+        }
+    }
+    text
+}
+
+/// Name of the value that was refused, as scenarios write it.
+fn parameter(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str> {
+    use RefusalReason as Reason;
+    Some(match (request, refusal.reason) {
+        // What else is out of range in a jump is refused before it is sent.
+        (MotionRequest::Jump { .. }, Reason::OutOfRange) if refusal.limit == 0.0 => "top",
+        (MotionRequest::Jump { .. }, Reason::JointLimit) if refusal.axis == 2 => "to or top",
+        (_, Reason::OutOfRange) if request.is_move() => "speed",
+        (_, Reason::TooFar | Reason::TooNear | Reason::JointLimit | Reason::Singular) => "to",
+        (_, Reason::PayloadTooHeavy) => "mass",
+        (
+            MotionRequest::SetGains {
+                bandwidth,
+                damping,
+                observer,
+            },
+            Reason::OutOfRange,
+        ) => {
+            let gains = [
+                ("bandwidth", bandwidth),
+                ("damping", damping),
+                ("observer", observer),
+            ];
+            gains
+                .into_iter()
+                .find(|(_, gain)| **gain == refusal.value)?
+                .0
+        }
+        _ => return None,
+    })
+}
+
+/// Unit of value and limit; `None` where there are none.
+fn unit(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str> {
+    use RefusalReason as Reason;
+    let axis = AXES.get(usize::from(refusal.axis));
+    Some(match (request, refusal.reason) {
+        (_, Reason::TooFar | Reason::TooNear) => "m",
+        (_, Reason::JointLimit) => axis?.1,
+        (_, Reason::TorqueTooSmall) => axis?.2,
+        (_, Reason::PayloadTooHeavy) => "kg",
+        (_, Reason::Singular) => "(sine of the elbow)",
+        (MotionRequest::Jump { .. }, Reason::OutOfRange) if refusal.limit == 0.0 => "m",
+        (_, Reason::OutOfRange) => "",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn jump(reason: RefusalReason, axis: u8, value: f32, limit: f32) -> String {
+        let request = MotionRequest::Jump {
+            target: [0.6, 0.1, -0.2, 0.0],
+            top: -0.25,
+            clearance: 0.005,
+            speed: 1.0,
+        };
+        let refusal = Refusal {
+            reason,
+            axis,
+            value,
+            limit,
+        };
+        sentence(&request, &refusal)
+    }
+
+    #[test]
+    fn a_refusal_names_axis_parameter_value_limit_and_unit() {
+        assert_eq!(
+            jump(RefusalReason::JointLimit, 1, 2.75, 2.5),
+            "An axis would leave its range; axis elbow; parameter to: 2.75 rad, limit 2.5 rad"
+        );
+        assert_eq!(
+            jump(RefusalReason::OutOfRange, Refusal::NO_AXIS, -0.5, 0.0),
+            "A value is out of its range; parameter top is 0.5 m below the start or the end of the jump, allowed: not below \
+             either"
+        );
+        assert_eq!(
+            jump(RefusalReason::Stopped, Refusal::NO_AXIS, 0.0, 0.0),
+            "A stop came before the move was planned"
+        );
+    }
+}

@@ -1,0 +1,176 @@
+//! A rehearsal says what a run will come to; the run is the oracle.
+
+use sim::rehearsal::{RehearsalError, rehearse};
+use sim::run::in_process;
+use sim::scenario::{Change, Scenario};
+use sim::setup::RunConfig;
+use sim::summary::Summary;
+
+fn scenario(steps: &str) -> RunConfig {
+    let text = format!(
+        "name = \"t\"\ncycles = 2\nrate_hz = 1000\nlaw = \"computed-torque:observer\"\nstart = [0.5, 0.1, -0.2, 0.0]\n{steps}\n"
+    );
+    RunConfig::new(Scenario::parse(&text, "t").unwrap())
+}
+
+fn run(config: &RunConfig) -> Summary {
+    in_process(config, &mut ()).unwrap()
+}
+
+#[test]
+fn durations_and_torques_are_those_of_a_run_of_the_robot_that_the_controller_knows() {
+    for name in ["gate", "square", "pick-place"] {
+        let mut config = RunConfig::new(Scenario::built_in(name).unwrap());
+        config.scenario.cycles = 3;
+        let plan = rehearse(&config).unwrap();
+        let summary = run(&config);
+        assert!(summary.completed, "{name}: {:?}", summary.error);
+        // Words on the bus take some samples, and the operator waits for each: some twenty of them in a cycle.
+        let late = summary.sim_time_s - plan.duration_s;
+        assert!((0.0..0.3).contains(&late), "{name}: {late} s longer");
+        for axis in 0..4 {
+            let (planned, seen) = (
+                plan.torque_utilisation[axis],
+                summary.torque_utilisation[axis],
+            );
+            assert!(
+                (planned - seen).abs() < 0.05,
+                "{name}, {axis}: {planned}, {seen}"
+            );
+        }
+        // One cycle stands for those that follow, and its moves take what the reference took.
+        assert!(
+            plan.moves.iter().all(|planned| planned.duration_s > 0.05),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn moves_take_as_long_as_their_reference_moves() {
+    let config = scenario(
+        "[[cycle]]\nline = { to = [0.6, 0.1, -0.2, 0.0] }\n[[cycle]]\ndwell = 0.1\n[[cycle]]\nline = { to = [0.5, 0.1, -0.2, 0.0] }\n[[cycle]]\ndwell = 0.1",
+    );
+    let plan = rehearse(&config).unwrap();
+    let moved: f64 = plan.moves.iter().map(|planned| planned.duration_s).sum();
+    // From the first move to the last, the dwell and the planning of the second in between.
+    let commanded = run(&config).each_cycle[0].commanded_s;
+    let between = commanded - moved;
+    assert!((0.1..0.3).contains(&between), "{between}");
+    assert_eq!(plan.moves[0].step, "cycle[0].line");
+    assert_eq!(plan.moves[1].step, "cycle[2].line");
+}
+
+#[test]
+fn a_million_cycles_are_planned_once() {
+    let mut config = RunConfig::new(Scenario::built_in("gate").unwrap());
+    let one = rehearse(&config).unwrap();
+    config.scenario.cycles = 1_000_000;
+    let many = rehearse(&config).unwrap();
+    assert_eq!(many.moves, one.moves);
+    let cycle = (many.duration_s - one.duration_s) / 999_990.0;
+    assert!((one.duration_s / 10.0 - cycle).abs() < 0.1, "{cycle}");
+}
+
+#[test]
+fn what_a_rehearsal_refuses_a_run_refuses_in_the_same_words() {
+    let refused = [
+        (
+            "[[cycle]]\nline = { to = [5.0, 0.1, -0.2, 0.0] }",
+            "cycle[0].line",
+            "parameter to",
+        ),
+        (
+            "[[cycle]]\ndwell = 0.1\n[[cycle]]\njoints = { to = [0.5, -1.5, 0.5, 0.0] }",
+            "cycle[1].joints",
+            "axis lift",
+        ),
+        (
+            "[[cycle]]\njump = { to = [0.6, 0.1, -0.2, 0.0], top = -0.25, clearance = 0.005 }",
+            "cycle[0].jump",
+            "parameter top",
+        ),
+        (
+            "[[cycle]]\nline = { to = [-0.5, 0.1, -0.2, 0.0] }",
+            "cycle[0].line",
+            "step 1 of cycle 1",
+        ),
+    ];
+    for (steps, key, word) in refused {
+        let config = scenario(steps);
+        let Err(RehearsalError::Operator(error)) = rehearse(&config) else {
+            panic!("{steps}: not refused");
+        };
+        let error = error.to_string();
+        assert!(error.contains(key) && error.contains(word), "{error}");
+        // The robot of a run is where it is in other digits.
+        let words = |text: &str| text.replace(|c: char| c.is_ascii_digit() || c == '.', "");
+        assert_eq!(words(&run(&config).error.unwrap()), words(&error));
+    }
+}
+
+#[test]
+fn a_slow_move_may_take_its_time() {
+    let config = scenario(
+        "[[cycle]]\njoints = { to = [0.6, 1.5, 0.1, 0.0], speed = 0.002 }\n[[cycle]]\njoints = { to = [0.5, 1.4, 0.1, 0.0] }",
+    );
+    assert!(rehearse(&config).unwrap().duration_s > 120.0);
+}
+
+#[test]
+fn a_changed_value_is_checked_like_one_of_the_text_and_named_as_it_was_written() {
+    let with = |change: &str| {
+        let change: Change = change.parse().unwrap();
+        let text = sim::scenario::built_in("gate").unwrap();
+        Scenario::parse_with(text, "gate", &[change])
+    };
+    let taken = with("cycle[1].jump.speed=0.5").unwrap();
+    let sim::scenario::Step::Jump(jump) = taken.cycle[1] else {
+        panic!("{:?}", taken.cycle[1]);
+    };
+    assert!((jump.speed - 0.5).abs() < f64::EPSILON);
+    assert_eq!(with("law=pid").unwrap().law.to_string(), "pid");
+    assert_eq!(
+        with("gains.bandwidth=80").unwrap().gains.unwrap().bandwidth,
+        Some(80.0)
+    );
+
+    for (change, words) in [
+        ("cycles=0", "--set cycles=0: cycles is 0; allowed: 1 to"),
+        (
+            "payload.mass=nan",
+            "--set payload.mass=nan: payload.mass is NaN; allowed",
+        ),
+        (
+            "cycle[0].jump.to=[600, 0, 0, 0]",
+            "jump.to[0] is 600; allowed",
+        ),
+        ("gains.bandwith=80", "did you mean bandwidth?"),
+        (
+            "cycle[7].dwell=1",
+            "there is no cycle[7]; the first of 3 is [0]",
+        ),
+        ("rate_hz=fast", "--set rate_hz=fast: invalid type"),
+        ("name.x=1", "name is no table"),
+    ] {
+        let error = with(change).unwrap_err().to_string();
+        assert!(error.contains(words), "{change}: {error}");
+        assert!(error.contains("--set "), "{change}: {error}");
+    }
+    assert!("gains.bandwidth".parse::<Change>().is_err());
+}
+
+#[test]
+fn a_weight_alone_goes_to_what_is_picked() {
+    let mut picking = Scenario::built_in("pick-place").unwrap();
+    picking.carry(10.0).unwrap();
+    let sim::scenario::Step::Pick(picked) = picking.cycle[0] else {
+        panic!("{:?}", picking.cycle[0]);
+    };
+    // Twice the 5 kg of the file: twice the inertia, the same place.
+    assert!(
+        (picked.mass - 10.0).abs() < 1e-12 && (picked.inertia_com_diag[0] - 0.024).abs() < 1e-12
+    );
+    assert!(picking.payload.is_none());
+    assert!(picking.carry(0.0).is_err());
+}

@@ -1,0 +1,87 @@
+//! `plant-sim check`: whether a scenario could run, and what it would come to, without running it.
+
+use std::fmt::Write as _;
+
+use clap::Args;
+use sim::rehearsal::{Plan, RehearsalError, rehearse};
+
+use super::run::ConfigArgs;
+use super::{Failure, show};
+
+/// Arguments of `check`.
+#[derive(Args)]
+pub(super) struct CheckArgs {
+    /// What to check: gate, gate-mismatch, square, pick-place, or a scenario file.
+    #[arg(value_name = "SCENARIO", default_value = "gate")]
+    scenario: String,
+    #[command(flatten)]
+    config: ConfigArgs,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Plans the scenario and shows durations and torques. Fails where the controller would refuse a step.
+pub(super) fn run(args: &CheckArgs) -> Result<(), Failure> {
+    let config = args.config.config(&args.scenario)?;
+    let plan = rehearse(&config).map_err(|error| match error {
+        RehearsalError::Setup(error) => Failure::usage(error),
+        RehearsalError::Operator(error) => Failure::failed(format!(
+            "scenario {} cannot run: {error}",
+            config.scenario.name
+        )),
+    })?;
+    if args.json {
+        let json = serde_json::to_string_pretty(&plan).map_err(|error| error.to_string())?;
+        show(&(json + "\n"))
+    } else {
+        show(&text(&plan))
+    }
+}
+
+/// Moves that are listed; of a longer scenario the totals say enough.
+const LISTED: usize = 40;
+
+fn text(plan: &Plan) -> String {
+    let mut text = String::new();
+    let percent = |shares: &[f64; 4]| {
+        shares
+            .map(|share| format!("{:6.0} %", share * 100.0))
+            .join("  ")
+    };
+    let _ = writeln!(
+        text,
+        "{} on {}: nothing is refused",
+        plan.scenario, plan.robot
+    );
+    let _ = writeln!(
+        text,
+        "  move                      duration    torque, peak as planned\n{:41}shoulder   elbow     lift    wrist",
+        ""
+    );
+    for planned in plan.moves.iter().take(LISTED) {
+        let name = format!("{} of {}", planned.step, planned.cycle);
+        let _ = writeln!(
+            text,
+            "  {name:24}  {:8.3} s  {}",
+            planned.duration_s,
+            percent(&planned.torque_utilisation)
+        );
+    }
+    if let Some(more @ 1..) = plan.moves.len().checked_sub(LISTED) {
+        let _ = writeln!(text, "  and {more} more");
+    }
+    let cycles = if plan.cycles == 1 { "cycle" } else { "cycles" };
+    let _ = writeln!(
+        text,
+        "  torque, peak                          {}\n  speed, peak                           {}",
+        percent(&plan.torque_utilisation),
+        percent(&plan.speed_utilisation),
+    );
+    let _ = writeln!(
+        text,
+        "  {} {cycles} in {:.2} s, from switching on to switching off",
+        plan.cycles, plan.duration_s
+    );
+    text
+}

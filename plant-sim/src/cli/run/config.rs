@@ -1,0 +1,90 @@
+//! What to run with what: the options that change a scenario and choose robots.
+
+use clap::Args;
+use plant_sim::input;
+use plant_sim::say;
+use sim::model::RobotModel;
+use sim::scenario::Change;
+use sim::selection::LawChoice;
+use sim::setup::RunConfig;
+
+use crate::cli::Failure;
+
+/// Options that change a scenario and choose robots.
+#[derive(Args, Clone)]
+pub(crate) struct ConfigArgs {
+    /// Change one value of the scenario: gains.bandwidth=80, cycle[1].line.speed=0.5, mismatch.friction=1.2. May be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Change>,
+    /// Control law: kinematic-joint, kinematic-task, pid, pd-gravity, computed-torque or
+    /// computed-torque-task; the last two with :none, :integral or :observer (default). Short for --set law=NAME.
+    #[arg(long, value_name = "NAME")]
+    law: Option<LawChoice>,
+    /// Payload, announced and carried from the start; in a scenario that picks, what it picks.
+    #[arg(long, value_name = "KG")]
+    payload: Option<f64>,
+    /// Number of cycles. Short for --set cycles=N.
+    #[arg(long, value_name = "N")]
+    cycles: Option<u32>,
+    /// Control rate. Short for --set rate_hz=HZ.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// The robot as the controller knows it: irb930-22-1.05 (the default), irb930-12-0.85 or a model file; also the actual
+    /// one, unless --plant-model is given. Configure an external controller the same way: plant-sim model NAME|FILE.
+    #[arg(long, value_name = "NAME|FILE")]
+    model: Option<String>,
+    /// The actual robot: a name or a model file.
+    #[arg(long, value_name = "NAME|FILE")]
+    plant_model: Option<String>,
+}
+
+impl ConfigArgs {
+    /// What to run with what, each value checked as if the scenario's file had it.
+    pub(crate) fn config(&self, scenario: &str) -> Result<RunConfig, Failure> {
+        let mut changes = self.set.clone();
+        if let Some(law) = self.law.map(|law| law.to_string()) {
+            changes.push(Change::new(format!("--law {law}"), "law", law));
+        }
+        if let Some(cycles) = self.cycles {
+            changes.push(Change::new(format!("--cycles {cycles}"), "cycles", cycles));
+        }
+        if let Some(rate) = self.rate {
+            changes.push(Change::new(format!("--rate {rate}"), "rate_hz", rate));
+        }
+        let mut scenario = input::scenario(scenario, &changes)?;
+        let nominal = load(self.model.as_deref())?;
+        if let Some(kg) = self.payload {
+            let most = nominal.payload_max;
+            if !(0.0..=most).contains(&kg) {
+                return Err(Failure::usage(format!(
+                    "--payload is {kg} kg; allowed: 0 to {most} kg for {}",
+                    nominal.name
+                )));
+            }
+            scenario.carry(kg).map_err(|why| {
+                Failure::usage(format!("--payload {kg}: scenario {} {why}", scenario.name))
+            })?;
+        }
+        let actual = match &self.plant_model {
+            Some(name) => load(Some(name))?,
+            None => nominal.clone(),
+        };
+        Ok(RunConfig {
+            scenario,
+            nominal,
+            actual,
+        })
+    }
+}
+
+/// The robot of this name or model file, or the default one; warnings go to standard error.
+pub(crate) fn load(name: Option<&str>) -> Result<RobotModel, Failure> {
+    let Some(name) = name else {
+        return Ok(RobotModel::irb_930_22_105());
+    };
+    let (model, warnings) = input::robot(name)?;
+    for warning in warnings {
+        say!("plant-sim: warning: {name}: {warning}");
+    }
+    Ok(model)
+}

@@ -1,0 +1,181 @@
+//! Every exit code of docs/exit-codes.md, as a shell sees it.
+
+use std::fs;
+use std::process::{Command, Output, exit};
+
+use plant_sim::guard::guard;
+
+/// Set in the process that has to panic.
+const PANICS: &str = "PLANT_SIM_TEST_PANICS";
+
+fn plant_sim(arguments: &[&str]) -> Output {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("empty.log"), "").unwrap();
+    fs::write(
+        folder.path().join("bad.log"),
+        "(0.000000) can0 1C0##1FFFF\n",
+    )
+    .unwrap();
+    Command::new(env!("CARGO_BIN_EXE_plant-sim"))
+        .args(arguments)
+        .current_dir(folder.path())
+        .env("PATH", "")
+        .output()
+        .unwrap()
+}
+
+/// The exit code, with one message and no sign of a panic on standard error.
+fn code(arguments: &[&str]) -> i32 {
+    let output = plant_sim(arguments);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let code = output.status.code().unwrap();
+    assert_eq!(said.is_empty(), code == 0, "{arguments:?}: {said}");
+    assert!(
+        !said.contains("panicked") && !said.contains("backtrace"),
+        "{said}"
+    );
+    code
+}
+
+#[test]
+fn done_is_0() {
+    for done in [
+        &["--cycles", "1"][..],
+        &[
+            "run",
+            "--cycles",
+            "1",
+            "--model",
+            "irb930-12-0.85",
+            "--json",
+        ],
+        &["check"],
+        &["check", "gate", "--set", "gains.bandwidth=80", "--json"],
+        &["model", "irb930-12-0.85"],
+        &["completions", "bash"],
+        &["man"],
+        &["man", "--out", "pages"],
+        &["--help"],
+        &["--version"],
+    ] {
+        assert_eq!(code(done), 0, "{done:?}");
+    }
+}
+
+#[test]
+fn a_run_or_check_that_failed_is_1() {
+    // Ten times the friction and the weight end in a fault.
+    let faulty = [
+        "--set",
+        "mismatch.friction=10",
+        "--set",
+        "mismatch.payload=10",
+    ];
+    for failed in [
+        &[&["run", "--cycles", "1"][..], &faulty].concat()[..],
+        &["check", "--set", "cycle[0].jump.top=-0.29"],
+        &["run", "--set", "cycle[0].jump.top=-0.29"],
+        &["trace", "check", "bad.log"],
+        // Nothing is built for it first: there is no cargo either.
+        &["run", "--controller", "qemu"],
+        &["cost"],
+        &["crash"],
+        &["timing", "--bus", "slcan:/nowhere", "--seconds", "1"],
+    ] {
+        assert_eq!(code(failed), 1, "{failed:?}");
+    }
+    for needs in [&["run", "--controller", "qemu"][..], &["cost"], &["crash"]] {
+        let said = String::from_utf8(plant_sim(needs).stderr).unwrap();
+        assert!(said.contains("needs qemu-system-arm"), "{needs:?}: {said}");
+    }
+}
+
+#[test]
+fn wrong_usage_or_input_is_2() {
+    for wrong in [
+        &["--cylces", "1"][..],
+        &["run", "--scenario", "nowhere.toml"],
+        &["run", "--model", "irb940"],
+        &["run", "--cycles", "0"],
+        &["run", "--rate", "nan"],
+        &["run", "--payload", "-1"],
+        &["run", "--scenario", "pick-place", "--payload", "0"],
+        &["run", "--set", "gains.bandwidth"],
+        &["run", "--set", "gains.bandwidth=1e9"],
+        &["run", "--set", "start=[-0.5, -0.5, -0.2, 0.0]"],
+        &["run", "--image", "image.elf"],
+        &["run", "--channel", "uart"],
+        &["run", "--out", "empty.log"],
+        &["run", "--out", "/dev/null"],
+        &["check", "nowhere.toml"],
+        &["trace", "check", "nowhere.log"],
+        &["trace", "decode", "bad.log", "--out", "bad.log"],
+        &["monitor", "--bus", "socketcan:vcan0"],
+    ] {
+        assert_eq!(code(wrong), 2, "{wrong:?}");
+    }
+}
+
+#[test]
+fn nothing_judged_is_3() {
+    for tool in ["check", "replay", "decode", "stats", "plot"] {
+        assert_eq!(code(&["trace", tool, "empty.log"]), 3, "{tool}");
+    }
+}
+
+#[test]
+fn a_fault_of_our_own_is_70_and_one_line_for_a_report() {
+    if std::env::var_os(PANICS).is_some() {
+        exit(guard(|| panic!("two\nlines")).into());
+    }
+    let output = Command::new(std::env::current_exe().unwrap())
+        .args([
+            "--exact",
+            "a_fault_of_our_own_is_70_and_one_line_for_a_report",
+        ])
+        .arg("--nocapture")
+        .env(PANICS, "yes")
+        .env_remove("RUST_BACKTRACE")
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(70), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    for word in [
+        "fault of the program",
+        "exit_codes.rs",
+        "two lines",
+        "report",
+    ] {
+        assert!(said.contains(word), "{said}");
+    }
+}
+
+#[test]
+fn the_page_has_these_codes_and_no_others() {
+    let page = fs::read_to_string(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../docs/exit-codes.md"
+    ))
+    .unwrap();
+    let codes: Vec<&str> = page
+        .lines()
+        .filter_map(|line| line.strip_prefix("| ")?.split(' ').next())
+        .filter(|code| code.parse::<u8>().is_ok())
+        .collect();
+    assert_eq!(codes, ["0", "1", "2", "3", "70", "130"]);
+}
+
+#[test]
+fn what_is_built_in_is_named_in_help_and_refusals() {
+    let help = String::from_utf8(plant_sim(&["run", "--help"]).stdout).unwrap();
+    let words: Vec<&str> = help.split_whitespace().collect();
+    let help = words.join(" ");
+    let refused = String::from_utf8(plant_sim(&["run", "--model", "none"]).stderr).unwrap();
+    for name in sim::model::names().split(", ") {
+        assert!(help.contains(name) && refused.contains(name), "{name}");
+    }
+    for name in sim::scenario::names().split(", ") {
+        assert!(help.contains(name), "{name}");
+    }
+}
