@@ -12,7 +12,7 @@ use crate::say;
 /// Runs that are over sooner need none.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Between two lines where there is no terminal.
-const PAUSE: Duration = Duration::from_secs(5);
+const PAUSE: Duration = Duration::from_secs(2);
 
 /// Reports the progress of a long run on standard error.
 pub struct Progress {
