@@ -25,6 +25,9 @@ use settings::Settings;
 /// Default number of samples for which the last command is held without a new one.
 pub const HOLD_SAMPLES: u32 = DriveParameter::HoldSamples.initial(1.0) as u32;
 
+/// Greatest velocity that Feedback can carry, rad/s; the range in the message table.
+const VELOCITY_RANGE: f32 = 2000.0;
+
 /// The drives.
 #[derive(Clone, Debug)]
 pub struct Drives {
@@ -81,9 +84,11 @@ impl Drives {
         let mut torque = [0i16; 4];
         for axis in 0..4 {
             let counts = reading.counts[axis].wrapping_sub(before[axis]);
-            velocity[axis] = (f64::from(counts) * self.radians_per_count / period) as f32;
+            // What a broken encoder makes of it, no motor reaches: a drive reports its greatest value.
+            velocity[axis] = ((f64::from(counts) * self.radians_per_count / period) as f32)
+                .clamp(-VELOCITY_RANGE, VELOCITY_RANGE);
             let per_mille = reading.motor_torque[axis] / self.rated[axis] * 1000.0;
-            // `as` saturates: a drive reports its greatest value, not a wrapped one.
+            // `as` saturates, for the same reason.
             torque[axis] = per_mille.round() as i16;
         }
         let powered = self.control.contains(ControlWord::TORQUE_ENABLE);
@@ -103,7 +108,7 @@ impl Drives {
         self.sample = self.sample.wrapping_add(1);
         self.encoder
             .encode(&Message::Feedback(feedback))
-            .expect("encoder speeds and torques are finite and far inside the ranges")
+            .expect("encoder speeds and torques are finite and inside the ranges")
     }
 
     /// Takes a command that has just arrived. A damaged or old one is ignored.

@@ -39,6 +39,7 @@ pub mod controller;
 mod convert;
 pub mod curves;
 pub mod drives;
+pub mod faults;
 mod maths;
 pub mod metrics;
 pub mod model;

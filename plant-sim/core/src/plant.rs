@@ -5,6 +5,7 @@
 
 pub mod arm;
 pub mod brake;
+pub mod defect;
 pub mod drive;
 pub mod encoder;
 mod energy;
@@ -18,6 +19,7 @@ pub mod stop;
 use crate::model::{Payload, RobotModel};
 use arm::{Arm, Configuration};
 use brake::Brake;
+use defect::Defects;
 use drive::Drive;
 use encoder::Encoder;
 pub use energy::Energy;
@@ -51,6 +53,7 @@ pub struct Plant {
     max_step: u64,
     ledger: Rates,
     latched: (u64, Vector4<f64>),
+    defects: Defects,
 }
 
 /// Measurements of the drives, sampled by [`Plant::latch`].
@@ -104,6 +107,7 @@ impl Plant {
             now: 0,
             ledger: Rates::zeros(),
             latched: (0, Vector4::zeros()),
+            defects: Defects::default(),
         }
     }
 
@@ -161,7 +165,9 @@ impl Plant {
 
     /// Commands the brake of the lift; it follows after [`Brake::ENGAGE_NS`] or [`Brake::RELEASE_NS`].
     pub fn set_brake(&mut self, engaged: bool) {
-        self.brake.command(engaged, self.now);
+        if self.defects.brake_follows(engaged) {
+            self.brake.command(engaged, self.now);
+        }
     }
 
     /// Puts a payload into the gripper, in place of any other, at the speed of the flange.
@@ -316,7 +322,9 @@ impl Plant {
 
     fn given_torque(&self, motor_speed: &Vector4<f64>) -> Vector4<f64> {
         if self.torque_enabled {
-            self.drive.limited(&self.request, motor_speed)
+            let given = self.drive.limited(&self.request, motor_speed);
+            self.defects
+                .torque(given, &self.model.drive.motor_torque_limit)
         } else {
             Vector4::zeros()
         }
@@ -333,12 +341,12 @@ impl Plant {
         };
         self.latched = (self.now, total);
         Sample {
-            counts: self.encoder_counts(),
+            counts: self.defects.read(self.encoder_counts()),
             motor_torque,
         }
     }
 
-    /// Readings of the motor encoders.
+    /// Readings of the motor encoders, were they sound.
     pub fn encoder_counts(&self) -> [i32; 4] {
         <[f64; 4]>::from(self.drive.to_motor(&self.q)).map(|angle| self.encoder.counts(angle))
     }

@@ -3,13 +3,16 @@
 use std::io;
 
 use firmware::control::controller::Config;
+use protocol::messages::Node;
 
 use crate::controller::InProcess;
 use crate::drives::Drives;
+use crate::faults::{Faulty, Injector};
 use crate::observer::{Observer, Pace};
 use crate::operator::Operator;
 use crate::peer::{Peer, PeerError};
 use crate::rig::{Rig, RunError};
+use crate::scenario::Scenario;
 use crate::setup::{RunConfig, SetupError};
 use crate::summary::{Collector, Summary};
 
@@ -56,9 +59,15 @@ pub fn with_controller<C: Peer, P: Pace, O: Observer>(
     let controller = connect(rig.controller())?;
     let drives = Drives::new(&rig.actual, rig.period);
     let mut rig = Rig::new(&rig);
-    rig.attach(drives);
-    rig.attach(Operator::new(&config.scenario));
-    rig.attach(controller);
+    let Scenario { faults, seed, .. } = &config.scenario;
+    if !faults.is_empty() {
+        // Before the drives, so that what breaks at a sampling instant is sampled broken.
+        rig.attach(Injector::new(faults, *seed));
+    }
+    rig.attach(Faulty::new(drives, Node::Drives, faults, *seed));
+    let operator = Operator::new(&config.scenario);
+    rig.attach(Faulty::new(operator, Node::Operator, faults, *seed));
+    rig.attach(Faulty::new(controller, Node::Controller, faults, *seed));
     let mut observers = (Collector::new(config), observer);
     match rig.run(pace, &mut observers) {
         Err(RunError::Output(source)) => Err(Failure::Output(source)),

@@ -7,6 +7,7 @@ mod error;
 use protocol::parameters::ControllerParameter as Parameter;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::faults::Fault;
 use crate::model::Payload;
 use crate::selection::LawChoice;
 
@@ -54,6 +55,12 @@ pub struct Scenario {
     /// How the actual robot differs from the nominal one.
     #[serde(default)]
     pub mismatch: Mismatch,
+    /// What breaks during the run, as `encoder:elbow:stuck@0.3s`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<Fault>,
+    /// Seed of whatever is random in the faults.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub seed: u64,
     /// Steps of one cycle.
     pub cycle: Vec<Step>,
     /// The text that this was read from, for places in messages.
@@ -246,6 +253,14 @@ pub struct Line {
     /// Share of full speed.
     #[serde(default = "full")]
     pub speed: f64,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde hands over a reference"
+)]
+fn is_zero(seed: &u64) -> bool {
+    *seed == 0
 }
 
 fn full() -> f64 {

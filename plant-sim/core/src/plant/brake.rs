@@ -73,6 +73,11 @@ impl Brake {
         }
     }
 
+    /// Whether it was last commanded to close.
+    pub(super) fn is_engaged(&self) -> bool {
+        self.engaged
+    }
+
     /// Whether the brake pads touch.
     pub fn is_closed(&self) -> bool {
         self.closed

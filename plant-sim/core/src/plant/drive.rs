@@ -48,6 +48,11 @@ impl Drive {
         }
     }
 
+    /// Radians that the motor of `axis` turns per radian of the joint, or per metre of the lift.
+    pub(super) fn ratio(&self, axis: usize) -> f64 {
+        self.ratio[axis]
+    }
+
     /// Motor angles (rad) for joint positions, or motor speeds (rad/s) for joint speeds.
     pub fn to_motor(&self, q: &Vector4<f64>) -> Vector4<f64> {
         let mut phi = self.ratio.component_mul(q);

@@ -24,6 +24,11 @@ impl Encoder {
         (angle / TAU * self.counts_per_turn).round() as i64 as i32
     }
 
+    /// Counts per radian of the motor.
+    pub(super) fn counts_per_radian(&self) -> f64 {
+        self.counts_per_turn / TAU
+    }
+
     /// Motor angle (rad) at the middle of a count.
     pub fn angle(&self, counts: i32) -> f64 {
         f64::from(counts) * TAU / self.counts_per_turn

@@ -1,0 +1,162 @@
+//! Faults of what a node sends.
+
+use std::collections::VecDeque;
+
+use oorandom::Rand64;
+use protocol::frame::CanFrame;
+use protocol::messages::Node;
+use protocol::time::{Duration, Instant};
+
+use super::{Fault, FrameFault, What};
+use crate::peer::{Outbox, Peer, PeerError};
+use crate::world::World;
+
+/// Frames of a message that are kept, for replays.
+const HISTORY: usize = 64;
+
+/// A node whose frames suffer the faults of a run. Without faults it is the node itself.
+#[derive(Debug)]
+pub struct Faulty<P> {
+    peer: P,
+    faults: Vec<Suffered>,
+    random: Rand64,
+}
+
+/// A fault of one message's frames, or the silence of the node.
+#[derive(Debug)]
+struct Suffered {
+    fault: Fault,
+    /// The last frames of the message, the newest last; kept for replays alone.
+    history: VecDeque<CanFrame>,
+}
+
+impl<P: Peer> Faulty<P> {
+    /// `peer` as `node`, with those of the faults that concern what it sends.
+    pub fn new(peer: P, node: Node, faults: &[Fault], seed: u64) -> Self {
+        let concerned = faults.iter().filter(|fault| match fault.what {
+            What::Frames(info, _) => info.sender.is_none_or(|sender| sender == node),
+            What::Silent(silent) => silent == node,
+            _ => false,
+        });
+        Self {
+            peer,
+            faults: concerned
+                .map(|fault| Suffered {
+                    fault: fault.clone(),
+                    history: VecDeque::new(),
+                })
+                .collect(),
+            // Nodes draw from sequences of their own, so that what one sends does not change the luck of another.
+            random: Rand64::new(u128::from(seed) << 8 | node as u128),
+        }
+    }
+
+    fn is_silent(&self, now: Instant) -> bool {
+        self.faults
+            .iter()
+            .any(|Suffered { fault, .. }| matches!(fault.what, What::Silent(_)) && fault.acts(now))
+    }
+
+    /// What becomes of a frame that the node sends at `time`.
+    fn suffer(&mut self, time: Instant, frame: CanFrame, out: &mut Outbox) {
+        let mut sent = vec![(time, frame)];
+        for Suffered { fault, history } in &mut self.faults {
+            let What::Frames(info, kind) = fault.what else {
+                continue;
+            };
+            if !info.identifies(&frame) {
+                continue;
+            }
+            if let FrameFault::Replay(back) = kind {
+                let old = history
+                    .len()
+                    .checked_sub(back)
+                    .and_then(|place| history.get(place).copied());
+                history.push_back(frame);
+                if history.len() > HISTORY {
+                    history.pop_front();
+                }
+                if let (Some(old), true) = (old, fault.acts(time)) {
+                    sent = vec![(time, old)];
+                }
+                continue;
+            }
+            if !fault.acts(time) {
+                continue;
+            }
+            match kind {
+                FrameFault::Loss(share) => {
+                    if self.random.rand_float() < share {
+                        sent.clear();
+                    }
+                }
+                FrameFault::Delay(seconds) => delay(&mut sent, seconds),
+                FrameFault::Jitter(seconds) => delay(&mut sent, seconds * self.random.rand_float()),
+                FrameFault::Duplicate => sent.extend_from_within(..),
+                FrameFault::Corrupt(share) => {
+                    if self.random.rand_float() < share {
+                        for (_, frame) in &mut sent {
+                            flip(frame, &mut self.random);
+                        }
+                    }
+                }
+                FrameFault::Replay(_) => {}
+            }
+        }
+        out.extend(sent);
+    }
+}
+
+fn delay(sent: &mut Outbox, seconds: f64) {
+    let delay = Duration::from_nanos((seconds * 1e9).round() as u64);
+    for (time, _) in sent {
+        *time += delay;
+    }
+}
+
+/// Inverts one bit of the data.
+fn flip(frame: &mut CanFrame, random: &mut Rand64) {
+    let bits = 8 * frame.data().len() as u64;
+    if bits == 0 {
+        return;
+    }
+    let bit = random.rand_range(0..bits) as usize;
+    let mut data = frame.data().to_vec();
+    data[bit / 8] ^= 1 << (bit % 8);
+    let flipped = if frame.is_fd() {
+        CanFrame::fd(frame.id(), &data, frame.brs())
+    } else {
+        CanFrame::classical(frame.id(), &data)
+    };
+    *frame = flipped.unwrap_or(*frame);
+}
+
+impl<P: Peer> Peer for Faulty<P> {
+    fn wake(&self) -> Option<Instant> {
+        self.peer.wake()
+    }
+
+    fn poll(
+        &mut self,
+        now: Instant,
+        received: Option<&CanFrame>,
+        world: &mut World,
+        out: &mut Outbox,
+    ) -> Result<(), PeerError> {
+        if self.faults.is_empty() {
+            return self.peer.poll(now, received, world, out);
+        }
+        let silent = self.is_silent(now);
+        if silent && received.is_some() {
+            return Ok(());
+        }
+        let before = out.len();
+        self.peer.poll(now, received, world, out)?;
+        for (time, frame) in out.split_off(before) {
+            if !silent {
+                self.suffer(time, frame, out);
+            }
+        }
+        Ok(())
+    }
+}

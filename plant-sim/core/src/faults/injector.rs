@@ -1,0 +1,82 @@
+//! Faults of the robot itself.
+
+use protocol::frame::CanFrame;
+use protocol::time::Instant;
+
+use super::{Fault, What};
+use crate::peer::{Outbox, Peer, PeerError};
+use crate::plant::Plant;
+use crate::world::World;
+
+/// Breaks parts of the robot when their time comes, and repairs them. It sits among the peers for the sake of time alone:
+/// no frame reaches it, and it sends none.
+#[derive(Debug)]
+pub struct Injector {
+    /// What is to be done, the latest first.
+    todo: Vec<(Instant, What, Deed)>,
+    seed: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Deed {
+    Break,
+    Repair,
+}
+
+impl Injector {
+    /// For those of the faults that concern the robot; `seed` is that of the noise of encoders.
+    pub fn new(faults: &[Fault], seed: u64) -> Self {
+        let of_robot = faults
+            .iter()
+            .filter(|fault| !matches!(fault.what, What::Frames(..) | What::Silent(_)));
+        let mut todo: Vec<_> = of_robot
+            .flat_map(
+                |Fault {
+                     what, from, until, ..
+                 }| {
+                    [(*from, *what, Deed::Break), (*until, *what, Deed::Repair)]
+                },
+            )
+            .filter(|(time, ..)| *time < Instant::MAX)
+            .collect();
+        todo.sort_by_key(|(time, ..)| std::cmp::Reverse(*time));
+        Self { todo, seed }
+    }
+
+    fn act(&self, plant: &mut Plant, what: What, deed: Deed) {
+        let is_broken = deed == Deed::Break;
+        match what {
+            What::Encoder(axis, defect) => {
+                plant.break_encoder(axis, is_broken.then_some(defect), self.seed);
+            }
+            What::Motor(axis, defect) => plant.break_motor(axis, is_broken.then_some(defect)),
+            What::BrakeStuck => plant.break_brake(is_broken),
+            // What has fallen out does not come back.
+            What::PayloadDropped if is_broken => plant.release(),
+            What::PayloadDropped | What::Frames(..) | What::Silent(_) => {}
+        }
+    }
+}
+
+impl Peer for Injector {
+    fn wake(&self) -> Option<Instant> {
+        self.todo.last().map(|(time, ..)| *time)
+    }
+
+    fn poll(
+        &mut self,
+        now: Instant,
+        received: Option<&CanFrame>,
+        world: &mut World,
+        _: &mut Outbox,
+    ) -> Result<(), PeerError> {
+        if received.is_some() {
+            return Ok(());
+        }
+        world.plant.advance_to(now.nanos());
+        while let Some((_, what, deed)) = self.todo.pop_if(|(time, ..)| *time <= now) {
+            self.act(&mut world.plant, what, deed);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,210 @@
+//! Planned faults: what is written is what happens, nothing else happens, and the arm stops for the right cause.
+
+use std::io;
+
+use protocol::frame::CanFrame;
+use protocol::messages::{Cause, Message};
+use protocol::time::Instant;
+use protocol::{codec, table};
+use sim::faults::{Fault, KINDS};
+use sim::observer::{Observer, Truth};
+use sim::run::in_process;
+use sim::scenario::Scenario;
+use sim::setup::RunConfig;
+use sim::summary::Summary;
+
+/// The frames and the flange of a run.
+#[derive(Default)]
+struct Record {
+    frames: Vec<(Instant, CanFrame)>,
+    truths: Vec<Truth>,
+}
+
+impl Observer for Record {
+    fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        self.frames.push((time, *frame));
+        Ok(())
+    }
+
+    fn sample(&mut self, truth: &Truth) -> io::Result<()> {
+        self.truths.push(*truth);
+        Ok(())
+    }
+}
+
+fn run(faults: &[&str], seed: u64) -> (Summary, Record) {
+    let mut scenario = Scenario::built_in("gate").expect("the gate is built in");
+    scenario.cycles = 1;
+    scenario.faults = faults
+        .iter()
+        .map(|text| text.parse().expect("a fault"))
+        .collect();
+    scenario.seed = seed;
+    let mut record = Record::default();
+    let summary = in_process(&RunConfig::new(scenario), &mut record).expect("the gate can begin");
+    (summary, record)
+}
+
+/// The first cause that the controller reports.
+fn cause(record: &Record) -> Cause {
+    let emergency = |frame: &CanFrame| match codec::decode(frame).ok()?.message {
+        Message::Emergency(_, emergency) if emergency.cause != Cause::None => Some(emergency.cause),
+        _ => None,
+    };
+    let mut causes = record
+        .frames
+        .iter()
+        .filter_map(|(_, frame)| emergency(frame));
+    causes.next().unwrap_or(Cause::None)
+}
+
+/// In motion at 0.4 s.
+const CASES: [(&str, Cause); 10] = [
+    ("feedback:loss@0.4s", Cause::PeerSilent),
+    ("feedback:corrupt@0.4s", Cause::Corrupted),
+    ("drives:silent@0.4s", Cause::PeerSilent),
+    ("encoder:elbow:stuck@0.4s", Cause::FollowingError),
+    ("encoder:shoulder:jump=0.5@0.4s", Cause::EncoderFault),
+    ("encoder:elbow:reversed@0.4s", Cause::FollowingError),
+    ("motor:elbow:dead@0.4s", Cause::FollowingError),
+    ("motor:shoulder:runaway@0.4s", Cause::FollowingError),
+    ("motor:lift:dead@0.4s", Cause::FollowingError),
+    ("encoder:elbow:bit=18@0.4s", Cause::EncoderFault),
+];
+
+#[test]
+fn the_arm_stops_for_the_right_cause_and_stays_stopped() {
+    for (text, expected) in CASES {
+        let (summary, record) = run(&[text], 0);
+        let found = cause(&record);
+        assert_eq!(found, expected, "{text}");
+        assert!(!summary.completed, "{text}");
+        let last = record.truths.last().expect("a run has samples").plant;
+        assert!(
+            last.qd.iter().all(|qd| qd.abs() < 1e-2),
+            "{text} leaves the arm in motion: {:?}",
+            last.qd
+        );
+    }
+}
+
+/// The controller hears nothing of its commands being lost; the drives brake by themselves.
+#[test]
+fn the_drives_brake_when_commands_stop_arriving() {
+    for text in ["command:loss@0.4s", "controller:silent@0.4s"] {
+        let (summary, record) = run(&[text], 0);
+        assert!(!summary.completed, "{text}");
+        let commands = |(time, frame): &&(Instant, CanFrame)| {
+            table::COMMAND.identifies(frame) && time.seconds() > 0.4005
+        };
+        assert_eq!(record.frames.iter().filter(commands).count(), 0, "{text}");
+        let last = record.truths.last().expect("a run has samples").plant;
+        assert!(last.qd.iter().all(|qd| qd.abs() < 1e-2), "{text}");
+    }
+}
+
+/// What a sound link carries must survive: a few lost or doubled frames are no reason to stop.
+#[test]
+fn a_few_bad_frames_are_ridden_out() {
+    for text in [
+        "feedback:loss@0.4s..0.402s",
+        "feedback:duplicate@0.4s..0.402s",
+        "command:loss@0.4s..0.403s",
+        "command:duplicate@0.4s..0.6s",
+        "command:corrupt@0.4s..0.403s",
+        "state:loss@0.3s..0.5s",
+        "motionreply:duplicate@0s",
+        "feedback:jitter=0.0001@0.3s..0.5s",
+    ] {
+        let (summary, record) = run(&[text], 1);
+        assert!(summary.completed, "{text}: {:?}", cause(&record));
+    }
+}
+
+#[test]
+fn chance_follows_the_seed_alone() {
+    let frames = |seed| run(&["command:loss=0.2@0.3s..0.5s"], seed).1.frames;
+    assert_eq!(frames(7), frames(7));
+    assert_ne!(frames(7), frames(8));
+}
+
+#[test]
+fn a_fault_outside_the_run_changes_nothing() {
+    let (_, sound) = run(&[], 0);
+    for kind in KINDS {
+        let place = match kind.place {
+            "message" => "feedback",
+            "node" => "controller",
+            place => place,
+        };
+        let axis = if kind.has_axis { ":lift" } else { "" };
+        let value = kind
+            .value
+            .map_or_else(String::new, |value| format!("={}", value.greatest));
+        let text = format!("{place}{axis}:{}{value}@1000s..2000s", kind.name);
+        let (_, record) = run(&[&text], 0);
+        assert_eq!(record.frames, sound.frames, "{text}");
+    }
+}
+
+#[test]
+fn a_payload_that_falls_is_felt() {
+    let (_, sound) = run(&[], 0);
+    let (_, dropped) = run(&["payload:dropped@0.4s"], 0);
+    let differs = |(a, b): (&Truth, &Truth)| a.plant.q != b.plant.q;
+    let first = sound.truths.iter().zip(&dropped.truths).position(differs);
+    let time = first.map(|index| sound.truths[index].plant.t);
+    assert!(time.is_some_and(|t| (0.4..0.402).contains(&t)), "{time:?}");
+}
+
+#[test]
+fn a_stuck_brake_keeps_the_lift_closed_or_open() {
+    // Closed when it sticks: the lift never moves, and the controller does not take that for a motion.
+    let (summary, record) = run(&["brake:stuck@0s"], 0);
+    assert!(!summary.completed);
+    let heights: Vec<_> = record.truths.iter().map(|truth| truth.plant.q[2]).collect();
+    let moved = heights
+        .iter()
+        .fold(0.0_f64, |most, q| most.max((q - heights[0]).abs()));
+    assert!(moved < 1e-3, "{moved}");
+}
+
+#[test]
+fn what_is_not_a_fault_is_refused_with_what_is_allowed() {
+    for (text, expected) in [
+        ("encoder:elbow:stuck", "there is no time"),
+        (
+            "encoder:elbow:stuck@0.3",
+            "is not a time; allowed: seconds as 0.3s",
+        ),
+        ("encoder:elbow:stuck@0.5s..0.3s", "ends before it begins"),
+        ("encoder:elbo:stuck@0.3s", "did you mean elbow?"),
+        ("encoder:elbow:stuk@0.3s", "did you mean stuck?"),
+        ("encodr:elbow:stuck@0.3s", "did you mean encoder?"),
+        (
+            "encoder:stuck@0.3s",
+            "there is no axis \"stuck\"; allowed: shoulder, elbow, lift, wrist",
+        ),
+        ("encoder:elbow:jump@0.3s", "jump needs a value"),
+        (
+            "encoder:elbow:jump=nan@0.3s",
+            "jump is nan; allowed: -10 to 10 rad",
+        ),
+        ("command:loss=2@0.3s", "loss is 2; allowed: 0 to 1"),
+        ("command:duplicate=2@0.3s", "duplicate takes no value"),
+        ("command:loss:1@0.3s", "is too much"),
+        ("", "there is no time"),
+    ] {
+        let error = text.parse::<Fault>().expect_err(text).to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+    let text = include_str!("../../scenarios/gate.toml");
+    let text = format!("faults = [\"encoder:elbo:stuck@0.3s\"]\n{text}");
+    let error = Scenario::parse(&text, "mine")
+        .expect_err("no such axis")
+        .to_string();
+    assert!(
+        error.contains("line 1") && error.contains("did you mean elbow?"),
+        "{error}"
+    );
+}
