@@ -3,6 +3,7 @@
 use clap::Args;
 use plant_sim::input;
 use plant_sim::say;
+use sim::faults::Fault;
 use sim::model::RobotModel;
 use sim::scenario::Change;
 use sim::selection::LawChoice;
@@ -29,6 +30,13 @@ pub(crate) struct ConfigArgs {
     /// Control rate. Short for --set rate_hz=HZ.
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
+    /// Break something: PLACE[:AXIS]:KIND[=VALUE]@FROM[..UNTIL], such as encoder:elbow:stuck@0.4s or
+    /// command:loss=0.2@0.3s..0.5s. May be repeated; docs/faults.md lists the kinds.
+    #[arg(long, value_name = "FAULT")]
+    fault: Vec<Fault>,
+    /// Seed of whatever is random in the faults. Short for --set seed=N.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
     /// The robot as the controller knows it: irb930-22-1.05 (the default), irb930-12-0.85 or a model file; also the actual
     /// one, unless --plant-model is given. Configure an external controller the same way: plant-sim model NAME|FILE.
     #[arg(long, value_name = "NAME|FILE")]
@@ -51,7 +59,11 @@ impl ConfigArgs {
         if let Some(rate) = self.rate {
             changes.push(Change::new(format!("--rate {rate}"), "rate_hz", rate));
         }
+        if let Some(seed) = self.seed {
+            changes.push(Change::new(format!("--seed {seed}"), "seed", seed));
+        }
         let mut scenario = input::scenario(scenario, &changes)?;
+        scenario.faults.extend(self.fault.iter().cloned());
         let nominal = load(self.model.as_deref())?;
         if let Some(kg) = self.payload {
             let most = nominal.payload_max;
