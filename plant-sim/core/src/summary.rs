@@ -70,7 +70,7 @@ pub struct Summary {
     pub overruns: u64,
     /// Frames lost to a full transmit queue or an identifier collision.
     pub frames_lost: u64,
-    /// Faults that the controller reported.
+    /// Faults that the controller reported; one that follows itself is listed once.
     pub faults: Vec<Fault>,
     /// Simulated time.
     pub sim_time_s: f64,
@@ -218,6 +218,12 @@ impl Observer for Collector {
             return Ok(());
         };
         match received.message {
+            // While the arm stops, the controller says the same again; the trace has every one.
+            Message::Emergency(_, emergency)
+                if self
+                    .faults
+                    .last()
+                    .is_some_and(|last| last.cause == emergency.cause.name()) => {}
             Message::Emergency(_, emergency) => {
                 let mut fault = Fault {
                     time_s: time.seconds(),
