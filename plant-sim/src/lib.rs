@@ -12,6 +12,7 @@
 //! report                 the pages about runs (sources in pages)
 //! chart                  the SVG of plot and of external's histogram
 //! eval, input            models evaluated over the rows of a table; scenarios and robots from files
+//! reference              schemas of files and JSON output, and tables of them for the documents
 //! say, interrupt, guard  words to the terminal, signals, our own faults
 //! ```
 //!
@@ -45,6 +46,7 @@ pub mod plot;
 pub mod progress;
 pub mod qemu;
 pub mod record;
+pub mod reference;
 pub mod replay;
 pub mod report;
 pub mod run;

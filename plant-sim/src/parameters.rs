@@ -12,7 +12,7 @@ use protocol::codec;
 use protocol::messages::{Message, ParameterError, ParameterReply, ParameterRequest, Server};
 use protocol::parameters::{self, ControllerParameter, Parameter, Settable};
 
-pub use show::{json, markdown, table};
+pub use show::{Row, json, markdown, table};
 
 /// Wait for an answer before the request is repeated: some hundred samples.
 const PATIENCE: Duration = Duration::from_millis(250);

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use firmware::control::controller::Config;
+use schemars::JsonSchema;
 use serde::Serialize;
 use sim::controller::InProcess;
 use sim::observer::{Observer, Pace};
@@ -32,7 +33,7 @@ pub enum ExecuteError {
 }
 
 /// Results of a run, as in `summary.json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Results {
     /// Version of the program.
     pub version: &'static str,

@@ -1,5 +1,7 @@
 //! Allowed values of numbers in inputs.
 
+pub(crate) mod schema;
+
 use std::fmt;
 
 /// Allowed values of a number: finite and in a range.

@@ -15,6 +15,7 @@
 mod cycle;
 mod offset;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use cycle::Cycle;
@@ -26,7 +27,7 @@ use crate::observer::Truth;
 use crate::plant::arm::Arm;
 
 /// Least, mean and greatest of a quantity.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Spread {
     /// Least.
     pub min: f64,
@@ -37,7 +38,7 @@ pub struct Spread {
 }
 
 /// Mean and greatest; `null` where nothing settled.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MeanMax {
     /// Mean.
     pub mean: f64,
@@ -46,7 +47,7 @@ pub struct MeanMax {
 }
 
 /// Root mean square and greatest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct RmsMax {
     /// Root mean square.
     pub rms: f64,

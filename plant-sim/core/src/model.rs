@@ -4,6 +4,7 @@
 //! frames are: joint 1 at the origin, joint 2 at `(a1, 0, d1)` of link 1, joint 3 at `(a2, 0, d2)` of link 2 turned by
 //! pi about x (so that its z points down), joint 4 on the carriage, the flange at `(0, 0, d4)` of link 4.
 
+pub mod file;
 mod json;
 mod read;
 

@@ -32,8 +32,70 @@ impl<W: Write> Observer for TraceLog<W> {
     }
 }
 
-const TRUTH_HEADER: &str = "t,q1,q2,q3,q4,qd1,qd2,qd3,qd4,rq1,rq2,rq3,rq4,rqd1,rqd2,rqd3,rqd4,\
-                            tau1,tau2,tau3,tau4,x,y,z,yaw\n";
+/// Columns of the truth: name, unit, what it is. The lift is positive downwards.
+pub const TRUTH_COLUMNS: [(&str, &str, &str); 25] = [
+    ("t", "s", "Time of the sample."),
+    ("q1", "rad", "True joint position, shoulder."),
+    ("q2", "rad", "True joint position, elbow."),
+    ("q3", "m", "True joint position, lift."),
+    ("q4", "rad", "True joint position, wrist."),
+    ("qd1", "rad/s", "True joint velocity, shoulder."),
+    ("qd2", "rad/s", "True joint velocity, elbow."),
+    ("qd3", "m/s", "True joint velocity, lift."),
+    ("qd4", "rad/s", "True joint velocity, wrist."),
+    (
+        "rq1",
+        "rad",
+        "Reference position of the controller, shoulder.",
+    ),
+    ("rq2", "rad", "Reference position of the controller, elbow."),
+    ("rq3", "m", "Reference position of the controller, lift."),
+    ("rq4", "rad", "Reference position of the controller, wrist."),
+    (
+        "rqd1",
+        "rad/s",
+        "Reference velocity of the controller, shoulder.",
+    ),
+    (
+        "rqd2",
+        "rad/s",
+        "Reference velocity of the controller, elbow.",
+    ),
+    ("rqd3", "m/s", "Reference velocity of the controller, lift."),
+    (
+        "rqd4",
+        "rad/s",
+        "Reference velocity of the controller, wrist.",
+    ),
+    (
+        "tau1",
+        "N m",
+        "Effort that the motor brings to the joint, after all limits, shoulder.",
+    ),
+    (
+        "tau2",
+        "N m",
+        "Effort that the motor brings to the joint, after all limits, elbow.",
+    ),
+    (
+        "tau3",
+        "N",
+        "Effort that the motor brings to the joint, after all limits, lift.",
+    ),
+    (
+        "tau4",
+        "N m",
+        "Effort that the motor brings to the joint, after all limits, wrist.",
+    ),
+    ("x", "m", "True flange, x in frame 0."),
+    ("y", "m", "True flange, y in frame 0."),
+    ("z", "m", "True flange, z in frame 0."),
+    (
+        "yaw",
+        "rad",
+        "True flange, turn about z of frame 0, in (-pi, pi].",
+    ),
+];
 
 /// One row per sample: actual motion of the robot and its reference.
 pub struct TruthLog<W: Write>(W);
@@ -44,7 +106,8 @@ impl<W: Write> TruthLog<W> {
     /// # Errors
     /// Those of the sink.
     pub fn new(mut sink: W) -> io::Result<Self> {
-        sink.write_all(TRUTH_HEADER.as_bytes())?;
+        let header = TRUTH_COLUMNS.map(|(name, _, _)| name).join(",");
+        writeln!(sink, "{header}")?;
         Ok(Self(sink))
     }
 

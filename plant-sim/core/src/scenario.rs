@@ -5,8 +5,11 @@ mod check;
 mod error;
 
 use protocol::parameters::ControllerParameter as Parameter;
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::allowed::schema::{Gain, by};
+use crate::allowed::{PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS};
 use crate::faults::Fault;
 use crate::model::Payload;
 use crate::selection::LawChoice;
@@ -31,15 +34,17 @@ const BUILT_IN: [(&str, &str); 4] = [
     ),
 ];
 
-/// A run, ready to be executed. Lengths in m in frame 0, angles in rad.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+/// What to run. Lengths in m in frame 0, angles in rad. An unknown key is refused.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Name, for the summary.
     pub name: String,
     /// Number of cycles.
+    #[schemars(range(min = 1, max = MAX_CYCLES))]
     pub cycles: u32,
     /// Control rate, Hz.
+    #[schemars(transform = by(check::RATE))]
     pub rate_hz: f64,
     /// Control law and compensation, such as `computed-torque:observer`.
     pub law: LawChoice,
@@ -48,6 +53,7 @@ pub struct Scenario {
     pub gains: Option<GainsSpec>,
     /// Tool pose at the start: x, y, z, yaw. The elbow bends to the positive side.
     #[serde(deserialize_with = "exactly")]
+    #[schemars(transform = by(check::POSE))]
     pub start: [f64; 4],
     /// Payload at the flange from the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -57,11 +63,13 @@ pub struct Scenario {
     pub mismatch: Mismatch,
     /// What breaks during the run, as `encoder:elbow:stuck@0.3s`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(with = "Vec<String>")]
     pub faults: Vec<Fault>,
     /// Seed of whatever is random in the faults.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub seed: u64,
     /// Steps of one cycle.
+    #[schemars(length(min = 1))]
     pub cycle: Vec<Step>,
     /// The text that this was read from, for places in messages.
     #[serde(skip)]
@@ -85,28 +93,22 @@ fn exactly<'de, D: Deserializer<'de>, const N: usize>(
 }
 
 /// Gains of the closed loop, the same for every law. Those left out are the controller's own at this rate.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Gains")]
 pub struct GainsSpec {
     /// Natural frequency of the error dynamics, rad/s.
+    #[schemars(transform = Gain(Parameter::Bandwidth))]
     pub bandwidth: Option<f64>,
     /// Damping ratio.
+    #[schemars(transform = Gain(Parameter::Damping))]
     pub damping: Option<f64>,
     /// Corner of the disturbance observer, or 1 / integral time, rad/s.
+    #[schemars(transform = Gain(Parameter::Observer))]
     pub observer: Option<f64>,
 }
 
 impl GainsSpec {
-    /// These, with the controller's own for those that are left out, for samples every `period` seconds.
-    pub(crate) fn resolved(&self, period: f32) -> Self {
-        let [bandwidth, damping, observer] = self.each(period).map(|(_, _, value)| Some(value));
-        Self {
-            bandwidth,
-            damping,
-            observer,
-        }
-    }
-
     /// Key, parameter and value of each gain, for samples every `period` seconds.
     pub(crate) fn each(&self, period: f32) -> [(&'static str, Parameter, f64); 3] {
         [
@@ -121,17 +123,21 @@ impl GainsSpec {
     }
 }
 
-/// A payload as model files write it.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+/// What the flange carries. No moment of inertia is greater than the sum of the other two.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "Payload")]
 pub struct PayloadSpec {
-    /// kg.
+    /// Mass, kg.
+    #[schemars(transform = by(PAYLOAD_MASS))]
     pub mass: f64,
     /// Centre of mass in the flange frame, m.
     #[serde(deserialize_with = "exactly")]
+    #[schemars(transform = by(PAYLOAD_COM))]
     pub com_flange_frame: [f64; 3],
     /// Principal moments of inertia about the centre of mass, kg m².
     #[serde(deserialize_with = "exactly")]
+    #[schemars(transform = by(PAYLOAD_INERTIA))]
     pub inertia_com_diag: [f64; 3],
 }
 
@@ -174,12 +180,14 @@ impl From<PayloadSpec> for Payload {
 }
 
 /// Mismatch: actual value over nominal value.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mismatch {
     /// Of viscous and Coulomb friction of every axis.
+    #[schemars(transform = by(check::FACTOR))]
     pub friction: f64,
     /// Of mass and inertia of every payload.
+    #[schemars(transform = by(check::FACTOR))]
     pub payload: f64,
 }
 
@@ -193,7 +201,7 @@ impl Default for Mismatch {
 }
 
 /// One step of a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Step {
     /// Gate move: up, across, down.
@@ -203,9 +211,9 @@ pub enum Step {
     /// Straight in joint space.
     Joints(Line),
     /// Wait until the arm has arrived, then this many seconds.
-    Dwell(f64),
+    Dwell(#[schemars(transform = by(check::SECONDS))] f64),
     /// This many seconds after the last move was accepted, stop on the path.
-    Stop(f64),
+    Stop(#[schemars(transform = by(check::SECONDS))] f64),
     /// Take a payload and announce it.
     Pick(PayloadSpec),
     /// Release the payload and announce it.
@@ -228,30 +236,36 @@ impl Step {
 }
 
 /// A gate move.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Jump {
     /// Flange at the end: x, y, z (m) and yaw (rad) in frame 0.
     #[serde(deserialize_with = "exactly")]
+    #[schemars(transform = by(check::POSE))]
     pub to: [f64; 4],
     /// z of the flange on its way across, m in frame 0: absolute, not relative to start or end.
+    #[schemars(transform = by(check::LENGTH))]
     pub top: f64,
     /// Length of the strictly vertical part at each end, m upwards from the flange at that end.
+    #[schemars(transform = by(check::CLEARANCE))]
     pub clearance: f64,
     /// Share of full speed.
     #[serde(default = "full")]
+    #[schemars(transform = by(check::SPEED))]
     pub speed: f64,
 }
 
 /// A move to a pose or to joint positions.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
     /// Flange x, y, z (m) and yaw (rad) in frame 0, or the four joint positions (rad, rad, m, rad).
     #[serde(deserialize_with = "exactly")]
+    #[schemars(transform = by(check::EITHER))]
     pub to: [f64; 4],
     /// Share of full speed.
     #[serde(default = "full")]
+    #[schemars(transform = by(check::SPEED))]
     pub speed: f64,
 }
 

@@ -1,9 +1,11 @@
 //! Names of control laws: `LAW` or `LAW:COMPENSATION`.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
 use protocol::messages::{Compensation, Law};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize, Serializer};
 
 /// A control law and its compensation of friction and payload error.
@@ -63,6 +65,27 @@ impl TryFrom<String> for LawChoice {
 
     fn try_from(text: String) -> Result<Self, LawError> {
         text.parse()
+    }
+}
+
+impl JsonSchema for LawChoice {
+    fn schema_name() -> Cow<'static, str> {
+        "Law".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let names = Law::ALL.iter().flat_map(|law| {
+            let compensations: &[Compensation] = if law.takes_compensation() {
+                Compensation::ALL
+            } else {
+                &[]
+            };
+            let full = compensations
+                .iter()
+                .map(move |help| format!("{law}:{help}"));
+            std::iter::once(law.to_string()).chain(full)
+        });
+        json_schema!({ "type": "string", "enum": names.collect::<Vec<_>>() })
     }
 }
 

@@ -10,9 +10,10 @@ use protocol::messages::{Cause, FaultAxis, Message, Node, State};
 use protocol::schema::Content;
 use protocol::table;
 use protocol::time::Instant;
+use schemars::JsonSchema;
 use serde::Serialize;
 
-pub use recipe::{Model, Models, Recipe};
+pub use recipe::{GainsInForce, Model, Models, Recipe};
 
 use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
 use crate::observer::{Observer, Truth};
@@ -21,7 +22,7 @@ use crate::setup::RunConfig;
 use crate::world::CellEvent;
 
 /// Summary of a run, as `summary.json` holds it. Times in s, lengths in mm, shares of 1.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// What was run.
     #[serde(flatten)]
@@ -34,7 +35,7 @@ pub struct Summary {
     pub cycles_still: u32,
     /// Whether the scenario ran to its end.
     pub completed: bool,
-    /// Why not.
+    /// Why it did not.
     pub error: Option<String>,
     /// Final state of the controller, as reported; `null` if never.
     pub state: Option<&'static str>,
@@ -42,27 +43,29 @@ pub struct Summary {
     pub fault: Option<String>,
     /// Whether the arm ended at rest with its brake closed.
     pub at_rest: bool,
-    /// From the start of motion until the tool is back within 1 mm and 10 mrad and stays.
+    /// From the start of motion until the tool is back within 1 mm and 10 mrad and stays, s; `null` where nothing moved, or
+    /// where any cycle did not arrive.
     pub cycle_time_s: Option<Spread>,
-    /// From the end of the commanded motion until the tool is within 0.01 mm and 0.1 mrad and stays.
+    /// From the end of the commanded motion until the tool is within 0.01 mm and 0.1 mrad and stays, s; `null` as
+    /// above.
     pub settle_time_s: Option<MeanMax>,
-    /// True tool to commanded tool at the same instant, while the reference moves.
+    /// True tool to commanded tool at the same instant, while the reference moves, mm.
     pub tracking_error_mm: RmsMax,
-    /// True yaw to commanded yaw at the same instant, while the reference moves.
+    /// True yaw to commanded yaw at the same instant, while the reference moves, mrad.
     pub tracking_error_mrad: RmsMax,
-    /// Distance from the target at the end of a dwell.
+    /// Distance from the target at the end of a dwell, mm.
     pub final_error_mm: FinalError,
-    /// Yaw error from the target at the end of a dwell.
+    /// Yaw error from the target at the end of a dwell, mrad.
     pub final_error_mrad: FinalError,
-    /// Peak effort over its limit.
+    /// Peak effort over its limit, by axis, of 1.
     pub torque_utilisation: [f64; 4],
-    /// Root-mean-square effort over the continuous limit.
+    /// Root-mean-square effort over the continuous limit, by axis, of 1.
     pub thermal_utilisation: [f64; 4],
-    /// Peak speed over its limit.
+    /// Peak speed over its limit, by axis, of 1.
     pub speed_utilisation: [f64; 4],
-    /// Longest time with the motor at its limit, by axis, according to the plant.
+    /// Longest time with the motor at its limit, by axis, according to the plant, s.
     pub longest_saturation_s: [f64; 4],
-    /// Share of the time for which the bus was busy.
+    /// Share of the time for which the bus was busy, of 1.
     pub bus_load: f64,
     /// Frames delivered.
     pub frames: u64,
@@ -72,21 +75,21 @@ pub struct Summary {
     pub frames_lost: u64,
     /// Faults that the controller reported; one that follows itself is listed once.
     pub faults: Vec<Fault>,
-    /// Simulated time.
+    /// Simulated time, s.
     pub sim_time_s: f64,
     /// Every cycle by itself.
     pub each_cycle: Vec<CycleResult>,
 }
 
 /// Greatest offset from the target.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FinalError {
     /// mm or mrad; `null` if no cycle with a target was completed.
     pub max: Option<f64>,
 }
 
 /// A fault that the controller reported.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Fault {
     /// When, s.
     pub time_s: f64,

@@ -10,6 +10,7 @@ use firmware::control::phase::Phase;
 use plant_sim::input;
 use plant_sim::qemu::{self, COST_IMAGE, Channel, Costs, IMAGE, Options, Poll, Qemu};
 use protocol::table::FEEDBACK;
+use schemars::JsonSchema;
 use serde::Serialize;
 use sim::run::with_controller;
 use sim::selection::LawChoice;
@@ -83,21 +84,29 @@ fn measure(args: &CostArgs, image: Option<&PathBuf>, program: &str) -> Result<Co
 }
 
 /// Instructions by kind of call and by phase.
-#[derive(Serialize)]
-struct Report {
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Report {
+    /// By kind of call.
     calls: Vec<Row>,
+    /// By phase of a call.
     phases: Vec<Row>,
     /// Most stack used, bytes.
     stack: u32,
 }
 
 /// Instructions of calls of one kind, or of one phase of them.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Count")]
 struct Row {
+    /// Kind of call, or phase.
     name: &'static str,
+    /// How many.
     calls: usize,
+    /// Fewest instructions.
     min: u32,
+    /// Median.
     median: u32,
+    /// Most instructions.
     max: u32,
 }
 

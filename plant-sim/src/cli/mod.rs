@@ -15,6 +15,7 @@ mod parameters;
 mod record;
 mod report;
 mod run;
+mod schema;
 mod timing;
 mod trace;
 mod what_if;
@@ -71,6 +72,8 @@ enum Command {
     Dbc(dbc::DbcArgs),
     /// Write the messages of the link as a dissector for Wireshark (Lua).
     Dissector(dissector::DissectorArgs),
+    /// Print the JSON schema of a file or of JSON output.
+    Schema(schema::SchemaArgs),
     /// Write a robot for an external controller (controller --model).
     Model(model::ModelArgs),
     /// Write a completion script for a shell: plant-sim completions bash > /etc/bash_completion.d/plant-sim.
@@ -104,6 +107,7 @@ fn command(cli: Cli) -> Result<(), Failure> {
         Some(Command::Parameters(args)) => parameters::run(&args),
         Some(Command::Dbc(args)) => dbc::run(&args),
         Some(Command::Dissector(args)) => dissector::run(&args),
+        Some(Command::Schema(args)) => schema::run(&args),
         Some(Command::Model(args)) => model::run(&args),
         Some(Command::Completions(args)) => pages::completions(&args, Cli::command()),
         Some(Command::Man(args)) => pages::man(&args, Cli::command()),

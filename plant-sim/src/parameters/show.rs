@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use protocol::messages::Server;
 use protocol::parameters::{self, CORNER_PER_SAMPLE, Kind, Parameter};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Reading;
@@ -68,17 +69,29 @@ pub fn table(readings: &[Reading], period: f32) -> String {
     text
 }
 
-#[derive(Serialize)]
-struct Row {
+/// A parameter as it is written in JSON.
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Parameter")]
+pub struct Row {
+    /// Name; its number where this program does not know it.
     name: String,
+    /// Number on the bus.
     number: u16,
+    /// Node that has it.
     server: &'static str,
+    /// Value in force.
     value: f32,
+    /// Unit of value, bounds and default; empty where it has none.
     unit: &'static str,
+    /// Least value allowed.
     lower: f32,
+    /// Greatest value allowed.
     upper: f32,
+    /// Value after a start of the node; `null` for readings.
     default: Option<f32>,
+    /// When it can be set: `never`, `at rest` or `always`; `null` where this program does not know it.
     settable: Option<&'static str>,
+    /// What it is.
     about: &'static str,
 }
 

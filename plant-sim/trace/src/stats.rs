@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use protocol::frame::Id;
 use protocol::messages::{Message, NmtCommand};
 use protocol::wire::{BitTiming, FrameBits};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Entry, Interface, Record};
@@ -204,8 +205,8 @@ impl Bus {
     }
 }
 
-/// Statistics of a trace. `Display` formats them as a table.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// Statistics of a trace.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Statistics {
     /// Frames.
     pub frames: u64,
@@ -232,7 +233,7 @@ pub struct Statistics {
 }
 
 /// Statistics of one interface.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct BusStatistics {
     /// Its name.
     pub interface: String,
@@ -253,7 +254,7 @@ pub struct BusStatistics {
 }
 
 /// Statistics of one identifier.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct IdStatistics {
     /// Identifier, 3 or 8 hexadecimal digits.
     pub id: String,

@@ -1,5 +1,6 @@
 //! One cycle: when it moved, when the tool arrived, and how far off it ended.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::offset::Offset;
@@ -12,7 +13,7 @@ const FINE: Offset = Offset::new(1e-5, 1e-4);
 
 /// Result of one cycle. Times are `null` where nothing moved, where the tool never got that close, and, like the final
 /// error, where the cycle ends in a stop on the path and so has no target.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CycleResult {
     /// Start of motion, s of simulated time; where nothing moved, start of the cycle.
     pub start_s: f64,

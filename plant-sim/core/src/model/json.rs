@@ -160,7 +160,7 @@ impl<'a> Node<'a> {
     }
 
     /// Warns of unknown keys, with the nearest known one.
-    pub(super) fn warn_of_unknown(&self, known: &[&str], warnings: &mut Vec<String>) {
+    pub(super) fn warn_of_unknown(&self, known: &[String], warnings: &mut Vec<String>) {
         for (node, hint) in self.unknown(known) {
             warnings.push(format!(
                 "line {}: {} is not known and not used{hint}",
@@ -171,7 +171,7 @@ impl<'a> Node<'a> {
     }
 
     /// Refuses unknown keys.
-    pub(super) fn refuse_unknown(&self, known: &[&str]) -> Result<(), ModelError> {
+    pub(super) fn refuse_unknown(&self, known: &[String]) -> Result<(), ModelError> {
         match self.unknown(known).next() {
             Some((node, hint)) => Err(ModelError {
                 place: Some(place_of(self.text, &node.path)),
@@ -186,13 +186,13 @@ impl<'a> Node<'a> {
 
     fn unknown<'b>(
         &self,
-        known: &'b [&str],
+        known: &'b [String],
     ) -> impl Iterator<Item = (Node<'a>, String)> + use<'_, 'a, 'b> {
         let object = self.value.as_object().into_iter().flatten();
         object
-            .filter(|(key, _)| !known.contains(&key.as_str()))
+            .filter(|(key, _)| !known.contains(key))
             .map(move |(key, value)| {
-                let hint = nearest(key, known.iter().copied())
+                let hint = nearest(key, known.iter().map(String::as_str))
                     .map_or_else(String::new, |near| format!("; did you mean {near}?"));
                 (self.child(value, Segment::Key(key.clone())), hint)
             })

@@ -8,6 +8,10 @@ mod drive;
 
 use std::f64::consts::PI;
 
+use super::file::{
+    self, ANGLE, ANGULAR_SPEED, ANY_POSITIVE, COORDINATE, GRAVITY, LENGTH, LINK_INERTIA, LINK_MASS,
+    PAYLOAD_MAX, SPEED, keys,
+};
 use super::json::{self, Node};
 use super::{Geometry, JointLimits, Link, ModelError, Payload, RobotModel};
 use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
@@ -16,69 +20,6 @@ use crate::text::Source;
 
 /// Tolerance for a derived or implied number to agree with another one: model files carry rounded decimals.
 const SAME: f64 = 1e-9;
-
-const LENGTH: Allowed = Allowed::above_zero(10.0, "m");
-const COORDINATE: Allowed = Allowed::within(-10.0, 10.0, "m");
-const LINK_MASS: Allowed = Allowed::above_zero(1000.0, "kg");
-/// Not zero: without inertia of the shaft the mass matrix would be singular.
-const LINK_INERTIA: Allowed = Allowed::above_zero(1000.0, "kg m2");
-/// About three turns either way.
-const ANGLE: Allowed = Allowed::within(-20.0, 20.0, "rad");
-const ANGULAR_SPEED: Allowed = Allowed::above_zero(1000.0, "rad/s");
-const SPEED: Allowed = Allowed::above_zero(100.0, "m/s");
-const ANY_POSITIVE: Allowed = Allowed::above_zero(1e9, "");
-const ANY_NOT_NEGATIVE: Allowed = Allowed::within(0.0, 1e9, "");
-
-/// Known keys, including those that other programs put into the same file.
-const ROOT: &[&str] = &[
-    "name",
-    "units",
-    "gravity",
-    "dh",
-    "joint_limits",
-    "links",
-    "payload_rated_max_kg",
-    "drive",
-    "comment",
-    "dh_convention",
-    "base_frame_height_above_mounting",
-    "base",
-    "payload_inertia_izz",
-    "payload_test_10kg",
-    "payload_test_ecc5kg",
-    "spec",
-    "variants",
-];
-const DH: &[&str] = &[
-    "a1",
-    "a2",
-    "alpha",
-    "d1",
-    "d2",
-    "d4",
-    "variables",
-    "comment",
-];
-const LIMITS: &[&str] = &[
-    "lower",
-    "upper",
-    "velocity",
-    "acceleration_cap",
-    "jerk_cap",
-    "effort_peak",
-    "effort_continuous_rms",
-    "comment",
-];
-const LINK: &[&str] = &[
-    "name",
-    "mass",
-    "com_joint_frame",
-    "inertia_com_diag",
-    "com_dh_frame",
-    "lc",
-    "comment",
-];
-const PAYLOAD: &[&str] = &["mass", "com_flange_frame", "inertia_com_diag", "comment"];
 
 pub(super) fn robot(text: &str) -> Result<(RobotModel, Vec<String>), ModelError> {
     let value = json::parse(text)?;
@@ -108,20 +49,20 @@ pub(super) fn robot(text: &str) -> Result<(RobotModel, Vec<String>), ModelError>
         drive,
         payload_max: root
             .get("payload_rated_max_kg", "an object")?
-            .number("max", Allowed::above_zero(100.0, "kg"))?,
+            .number("max", PAYLOAD_MAX)?,
         source: Source {
             origin: String::new(),
             text: text.into(),
         },
     };
-    root.warn_of_unknown(ROOT, &mut warnings);
+    root.warn_of_unknown(&keys::<file::ModelFile>(), &mut warnings);
     Ok((model, warnings))
 }
 
 pub(super) fn payload(text: &str) -> Result<Payload, ModelError> {
     let value = json::parse(text)?;
     let root = Node::root(text, &value);
-    root.refuse_unknown(PAYLOAD)?;
+    root.refuse_unknown(&keys::<file::PayloadFile>())?;
     Ok(Payload {
         mass: root.number("mass", PAYLOAD_MASS)?,
         com: root.numbers("com_flange_frame", PAYLOAD_COM)?,
@@ -140,7 +81,7 @@ fn units(root: &Node<'_>) -> Result<(), ModelError> {
 }
 
 fn gravity(root: &Node<'_>) -> Result<f64, ModelError> {
-    let [x, y, z] = root.numbers("gravity", Allowed::within(-100.0, 100.0, "m/s2"))?;
+    let [x, y, z] = root.numbers("gravity", GRAVITY)?;
     if x != 0.0 || y != 0.0 {
         // The lift would no longer be the only axis that carries weight, which nothing here supports.
         return Err(root.get("gravity", "")?.wrong("vertical: [0, 0, z]"));
@@ -149,7 +90,7 @@ fn gravity(root: &Node<'_>) -> Result<f64, ModelError> {
 }
 
 fn geometry(dh: &Node<'_>, warnings: &mut Vec<String>) -> Result<Geometry, ModelError> {
-    dh.warn_of_unknown(DH, warnings);
+    dh.warn_of_unknown(&keys::<file::Dh>(), warnings);
     let alpha: [f64; 4] = dh.numbers("alpha", ANGLE)?;
     let scara = [0.0, PI, 0.0, 0.0];
     if alpha
@@ -188,7 +129,7 @@ fn joints(
 }
 
 fn limits(node: &Node<'_>, warnings: &mut Vec<String>) -> Result<JointLimits, ModelError> {
-    node.warn_of_unknown(LIMITS, warnings);
+    node.warn_of_unknown(&keys::<file::Limits>(), warnings);
     let limits = JointLimits {
         lower: joints(node, "lower", ANGLE, COORDINATE)?,
         upper: joints(node, "upper", ANGLE, COORDINATE)?,
@@ -241,8 +182,9 @@ fn links(
         com: [0.0; 3],
         inertia: [0.0; 3],
     }; 4];
+    let known = keys::<file::Link>();
     for (index, (link, node)) in links.iter_mut().zip(&nodes).enumerate() {
-        node.warn_of_unknown(LINK, warnings);
+        node.warn_of_unknown(&known, warnings);
         check_order(node, index)?;
         *link = Link {
             mass: node.number("mass", LINK_MASS)?,

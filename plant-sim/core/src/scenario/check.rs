@@ -7,18 +7,24 @@ use toml::de::{DeTable, DeValue};
 use super::{
     Jump, Line, MAX_CYCLES, PayloadSpec, Place, Scenario, ScenarioError, Step, check_rate,
 };
+use crate::allowed::schema::Each;
 use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
 use crate::model::RobotModel;
 use crate::text;
 
-const LENGTH: Allowed = Allowed::within(-10.0, 10.0, "m");
+pub(super) const LENGTH: Allowed = Allowed::within(-10.0, 10.0, "m");
 /// Two turns either way; the range of the wrist is checked with the robot.
 const YAW: Allowed = Allowed::within(-2.0 * TAU, 2.0 * TAU, "rad");
 const JOINT: Allowed = Allowed::within(-20.0, 20.0, "rad");
-const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
-const SPEED: Allowed = Allowed::above_zero(1.0, "of full speed");
-const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
-const FACTOR: Allowed = Allowed::within(0.0, 10.0, "");
+/// Of a pose: x, y, z, yaw.
+pub(super) const POSE: Each = Each([LENGTH, LENGTH, LENGTH, YAW]);
+/// Of a pose or of joint positions, whichever allows more.
+pub(super) const EITHER: Each = Each([Allowed::within(-20.0, 20.0, ""); 4]);
+pub(super) const RATE: Allowed = Allowed::within(100.0, 10_000.0, "Hz");
+pub(super) const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
+pub(super) const SPEED: Allowed = Allowed::above_zero(1.0, "of full speed");
+pub(super) const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
+pub(super) const FACTOR: Allowed = Allowed::within(0.0, 10.0, "");
 
 impl Scenario {
     /// Checks everything that does not depend on the robot.

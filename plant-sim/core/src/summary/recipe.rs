@@ -1,16 +1,17 @@
 //! What was run, with everything needed to run it again.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use trace::LogHash;
 
 use crate::model::RobotModel;
-use crate::scenario::{GainsSpec, Mismatch, PayloadSpec};
+use crate::scenario::{Mismatch, PayloadSpec, Scenario};
 use crate::setup::RunConfig;
 
 /// What was run. With the same version of the program, `scenario_text` and the two models give the same trace and the
 /// same truth, to the byte; the rest repeats parts of them for readers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Recipe {
     /// Name of the scenario.
     pub scenario: String,
@@ -18,11 +19,11 @@ pub struct Recipe {
     pub scenario_text: String,
     /// Law and compensation.
     pub law: String,
-    /// Control rate.
+    /// Control rate, Hz.
     pub rate_hz: f64,
     /// Gains in force.
-    pub gains: GainsSpec,
-    /// Mass of the payload at the start.
+    pub gains: GainsInForce,
+    /// Mass of the payload at the start, kg.
     pub payload_kg: f64,
     /// Payload at the flange from the start, as announced to the controller.
     pub payload: Option<PayloadSpec>,
@@ -32,8 +33,20 @@ pub struct Recipe {
     pub models: Models,
 }
 
+/// Gains of the closed loop, the scenario's or the controller's own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "Gains")]
+pub struct GainsInForce {
+    /// Natural frequency of the error dynamics, rad/s.
+    pub bandwidth: f64,
+    /// Damping ratio.
+    pub damping: f64,
+    /// Corner of the disturbance observer, or 1 / integral time, rad/s.
+    pub observer: f64,
+}
+
 /// The two robots of a run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Models {
     /// The nominal one, of the controller.
     pub controller: Model,
@@ -42,7 +55,7 @@ pub struct Models {
 }
 
 /// A robot, and the origin of its numbers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Model {
     /// Name in the model file.
     pub name: String,
@@ -62,10 +75,7 @@ impl Recipe {
             scenario_text: scenario.to_toml(),
             law: scenario.law.to_string(),
             rate_hz: scenario.rate_hz,
-            gains: scenario
-                .gains
-                .unwrap_or_default()
-                .resolved((1.0 / scenario.rate_hz) as f32),
+            gains: gains(scenario),
             payload_kg: scenario.payload.map_or(0.0, |payload| payload.mass),
             payload: scenario.payload,
             mismatch: scenario.mismatch,
@@ -74,6 +84,18 @@ impl Recipe {
                 robot: Model::of(&config.actual),
             },
         }
+    }
+}
+
+fn gains(scenario: &Scenario) -> GainsInForce {
+    let asked = scenario.gains.unwrap_or_default();
+    let [bandwidth, damping, observer] = asked
+        .each((1.0 / scenario.rate_hz) as f32)
+        .map(|(_, _, value)| value);
+    GainsInForce {
+        bandwidth,
+        damping,
+        observer,
     }
 }
 

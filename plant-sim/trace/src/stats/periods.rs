@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Bins per factor of two: neighbouring edges differ by at most 0.4 %. Below twice this number, every microsecond has
@@ -118,7 +119,7 @@ fn start(bin: u64) -> u64 {
 }
 
 /// Time from one frame to the next, ms.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PeriodStatistics {
     /// Shortest.
     pub min_ms: f64,
@@ -135,7 +136,7 @@ pub struct PeriodStatistics {
 }
 
 /// Periods of about the same length.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Bin {
     /// Shortest in this bin, ms.
     pub from_ms: f64,
