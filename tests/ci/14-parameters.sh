@@ -20,6 +20,7 @@ grep -q '^bandwidth  *150 rad/s  *1 to 250  *150  at rest$' alone.txt
 grep -q "the drives on .* do not answer" parameters.err || fail "silent drives are not reported"
 parameters --set bandwidth=120 >set.txt
 holds bandwidth 120.0 || fail "a value set is not kept"
+validate parameters all.json
 set_one() { timeout 30 "$plant_sim" parameters --bus "slcan:tcp:127.0.0.1:$port" --set "$1"; }
 refused "bandwidth cannot be 300; allowed: 1 to 250 rad/s" set_one bandwidth=300
 refused "sampling-period cannot be set" set_one sampling-period=0.001

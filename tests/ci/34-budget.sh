@@ -13,6 +13,7 @@ for count in first second; do
     timeout 100 "$plant_sim" cost --json --image "$image" --cost-image "$cost_image" >"$work/$count"
 done
 cmp "$work/first" "$work/second"
+validate cost "$work/first"
 
 echo "- memory and instructions"
 timeout 100 python3 tests/board/budget.py "${image%/*}" "$plant_sim"

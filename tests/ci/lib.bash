@@ -8,11 +8,12 @@
 #   - ends the jobs it has started when it ends.
 #
 # need, need_python, need_browser, need_vcan and need_cross install what a check depends on (root on Debian) or say what is missing.
-# build_host builds the project's programs.
+# build_host builds the project's programs; validate checks JSON and TOML against their schemas.
 
 set -Eeuo pipefail
 shopt -s inherit_errexit
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+root=$PWD
 export CARGO_TERM_COLOR=never PATH=$PATH:/usr/sbin:/sbin
 
 work=$(mktemp -d)
@@ -112,6 +113,12 @@ need_browser() { # sets $peers and exports PEERS, CHROMIUM: where tests/pages fi
         playwright-core@1.65.1 axe-core@4.14.1 uplot@1.6.32 2>"$work/npm.err"
     CHROMIUM=$(type -P chromium)
     export PEERS=$peers CHROMIUM
+}
+
+validate() { # validate SCHEMA FILE...: the files keep the schema that plant-sim prints under this name
+    need_python jsonschema==4.26.0
+    "$plant_sim" schema "$1" >"$work/$1.schema"
+    "$python" "$root/tests/ci/schema.py" "$work/$1.schema" "${@:2}"
 }
 
 need_vcan() { # what tests/with-vcan needs, and candump
