@@ -34,7 +34,7 @@ for run in run robots fault nothing; do
     validate scenario "$work/$run.toml"
 done
 
-echo "- statistics of a trace with an error frame, and a robot for the controller"
+echo "- statistics of a trace with an error frame, a robot for the controller, a plan"
 cat "$work/run/trace.log" - >"$work/errors.log" <<'END'
 (99.000000) can0 20000004#0001000000000000
 END
@@ -42,6 +42,8 @@ END
 validate statistics "$work/statistics.json"
 "$plant_sim" model >"$work/controller-model.json"
 validate controller-model "$work/controller-model.json"
+"$plant_sim" check pick-place --json >"$work/plan.json"
+validate plan "$work/plan.json"
 
 echo "- files that do not conform are found"
 sed 's/"mass": 11.5/"mass": -11.5/' plant-sim/models/irb930-22-1.05.json >"$work/wrong.json"

@@ -14,6 +14,7 @@ use firmware::mechanics::kinematics::Trig;
 use nalgebra::Vector4;
 use protocol::messages::{Cause, ControlWord, DriveStatus, Mode, MotionRequest, Outcome};
 use protocol::time::Duration;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::operator::program::{Action, Program, Task};
@@ -26,7 +27,7 @@ const SAME: f32 = 1e-5;
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// What a scenario comes to as planned.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Plan {
     /// Scenario.
     pub scenario: String,
@@ -45,7 +46,7 @@ pub struct Plan {
 }
 
 /// A move as planned.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Move {
     /// Cycle of the run, counted from 1.
     pub cycle: u32,

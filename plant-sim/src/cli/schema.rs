@@ -8,6 +8,7 @@ use plant_sim::run::Results;
 use schemars::{Schema, schema_for_value};
 use sim::model::RobotModel;
 use sim::model::file::{ModelFile, PayloadFile};
+use sim::rehearsal::Plan;
 use sim::scenario::Scenario;
 use trace::stats::Statistics;
 
@@ -40,6 +41,8 @@ enum Name {
     Statistics,
     /// parameters --json.
     Parameters,
+    /// check --json.
+    Plan,
     /// cost --json.
     Cost,
     /// A robot as controller --model takes it: what plant-sim model prints.
@@ -55,6 +58,7 @@ impl Name {
             Self::Summary => of_output::<Results>(),
             Self::Statistics => of_output::<Statistics>(),
             Self::Parameters => of_output::<Vec<Row>>(),
+            Self::Plan => of_output::<Plan>(),
             Self::Cost => of_output::<Report>(),
             // The controller's own type knows nothing of schemas: one of its values shows what it is.
             Self::ControllerModel => {
