@@ -37,6 +37,7 @@ pub struct Monitor {
     newest: BTreeMap<Id, Record>,
     state: Option<State>,
     events: VecDeque<Event>,
+    missed: u64,
 }
 
 /// A past event that remains of interest.
@@ -55,13 +56,13 @@ pub struct Picture {
     newest: BTreeMap<Id, Record>,
     state: Option<State>,
     events: VecDeque<Event>,
+    missed: u64,
 }
 
 impl Monitor {
-    /// An empty monitor of the bus of this name.
+    /// An empty monitor of the bus of this name; the load is that of a bus of this timing.
     #[must_use]
-    pub fn new(title: &str) -> Self {
-        let timing = BitTiming::default();
+    pub fn new(title: &str, timing: BitTiming) -> Self {
         Self {
             title: title.to_owned(),
             timing,
@@ -74,7 +75,13 @@ impl Monitor {
             newest: BTreeMap::new(),
             state: None,
             events: VecDeque::new(),
+            missed: 0,
         }
+    }
+
+    /// Frames that were on the bus since the start and did not come here.
+    pub fn missed(&mut self, frames: u64) {
+        self.missed = frames;
     }
 
     /// Adds a record from the bus.
@@ -139,6 +146,7 @@ impl Monitor {
             newest: self.newest.clone(),
             state: self.state,
             events: self.events.clone(),
+            missed: self.missed,
         }
     }
 

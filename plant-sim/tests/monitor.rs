@@ -7,6 +7,7 @@ use protocol::messages::{
     Cause, Compensation, DriveStatus, Emergency, FaultAxis, Feedback, Law, LimitFlags, Message,
     Mode, Node, State,
 };
+use protocol::wire::BitTiming;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::KeyCode;
@@ -90,7 +91,7 @@ fn line(screen: &[String], part: &str) -> String {
 /// 1 kHz for 1.5 s with sample 1200 lost: the last full second is shown, and the loss since the start.
 #[test]
 fn rates_are_those_of_the_last_second_and_losses_of_all() {
-    let mut monitor = Monitor::new("socketcan:can7");
+    let mut monitor = Monitor::new("socketcan:can7", BitTiming::default());
     for sample in (0..1500).filter(|sample| *sample != 1200) {
         take(&mut monitor, 1000 * u64::from(sample), feedback(sample));
     }
@@ -109,17 +110,40 @@ fn rates_are_those_of_the_last_second_and_losses_of_all() {
     assert!(line(&values, "sample=1499").contains("status=ready"));
 }
 
+/// The load is that of the bus that was named, and frames that did not come here are said.
+#[test]
+fn a_slower_bus_is_fuller_and_what_was_missed_is_said() {
+    let load = |timing: BitTiming| {
+        let mut monitor = Monitor::new("bus", timing);
+        for sample in 0..1500 {
+            take(&mut monitor, 1000 * u64::from(sample), feedback(sample));
+        }
+        monitor.missed(7);
+        let head = screen(&monitor, &[])[0].clone();
+        assert!(head.contains("7 missed"), "{head}");
+        let (_, load) = head.split_once("load ").unwrap();
+        let (percent, rest) = load.split_once(" % of ").unwrap();
+        (percent.parse::<f64>().unwrap(), rest.to_owned())
+    };
+    let (fast, rates) = load(BitTiming::new(1_000_000, 1_000_000, 800).unwrap());
+    assert!(rates.starts_with("1/1 Mbit/s"));
+    let (slow, rates) = load(BitTiming::new(500_000, 500_000, 800).unwrap());
+    assert!(rates.starts_with("0.5/0.5 Mbit/s"));
+    // Shown with one decimal.
+    assert!((slow - 2.0 * fast).abs() < 0.2, "{slow} {fast}");
+}
+
 /// Two seconds without a frame: nothing is shown as still arriving.
 #[test]
 fn silence_is_shown() {
-    let mut monitor = Monitor::new("bus");
+    let mut monitor = Monitor::new("bus", BitTiming::default());
     take(&mut monitor, 0, feedback(0));
     take(&mut monitor, 1000, feedback(1));
     for time in [1_000_000, 2_000_000] {
         monitor.tick(time);
     }
     let screen = screen(&monitor, &[]);
-    assert!(screen[0].contains("load 0.0 %"));
+    assert!(screen[0].contains("load 0.0 % of 1/5 Mbit/s"));
     let row = line(&screen, "Feedback");
     let words: Vec<&str> = row.trim_matches(['│', ' ']).split_whitespace().collect();
     assert_eq!(words[2], "-", "{row}");
@@ -127,7 +151,7 @@ fn silence_is_shown() {
 
 #[test]
 fn states_and_faults_are_told() {
-    let mut monitor = Monitor::new("bus");
+    let mut monitor = Monitor::new("bus", BitTiming::default());
     take(&mut monitor, 0, state(Mode::Moving, Cause::None));
     let emergency = Message::Emergency(Node::Controller, Emergency::new(Cause::OverSpeed, 0));
     take(&mut monitor, 250_000, codec::encode(&emergency, 0).unwrap());
@@ -154,7 +178,10 @@ fn states_and_faults_are_told() {
 /// cut off at the right.
 #[test]
 fn everything_can_be_reached_on_a_small_terminal() {
-    let mut monitor = Monitor::new("slcan:tcp:a-machine-with-a-long-name.example.org:29536");
+    let mut monitor = Monitor::new(
+        "slcan:tcp:a-machine-with-a-long-name.example.org:29536",
+        BitTiming::default(),
+    );
     let feedback = Feedback {
         sample: u32::MAX,
         status: DriveStatus::READY,
@@ -222,7 +249,7 @@ fn everything_can_be_reached_on_a_small_terminal() {
 /// No size makes it fail, and a word longer than a line is broken.
 #[test]
 fn any_size_of_terminal_is_drawn() {
-    let mut monitor = Monitor::new("bus");
+    let mut monitor = Monitor::new("bus", BitTiming::default());
     take(&mut monitor, 0, feedback(0));
     take(&mut monitor, 1, state(Mode::Fault, Cause::OverSpeed));
     for (width, height) in [(1, 1), (3, 3), (10, 5), (79, 2), (300, 100)] {

@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand.
 
 mod arrival;
+mod bitrate;
 mod check;
 mod cost;
 mod crash;

@@ -7,12 +7,14 @@ use clap::Args;
 use link::{Link, LinkAddress};
 use plant_sim::interrupt;
 use plant_sim::monitor::{Monitor, Picture, View};
+use protocol::wire::BitTiming;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 use trace::Interface;
 
 use super::Failure;
 use super::arrival::{microseconds, record};
+use super::bitrate::bit_timing;
 
 /// Time between two pictures.
 const REFRESH: Duration = Duration::from_millis(100);
@@ -27,6 +29,9 @@ pub(super) struct MonitorArgs {
     /// The bus: socketcan:INTERFACE, slcan:TERMINAL, slcan:tcp:HOST:PORT or slcan:listen:HOST:PORT.
     #[arg(long, value_name = "BUS")]
     bus: LinkAddress,
+    /// Bit rates of the bus, bit/s, for its load.
+    #[arg(long, value_name = "N[,D]", default_value = "1M,5M", value_parser = bit_timing)]
+    bitrate: BitTiming,
 }
 
 /// Shows the bus until the user quits.
@@ -37,7 +42,7 @@ pub(super) fn run(args: &MonitorArgs) -> Result<(), Failure> {
         ));
     }
     let mut link = Link::watch(&args.bus).map_err(|error| error.to_string())?;
-    let monitor = Monitor::new(&args.bus.to_string());
+    let monitor = Monitor::new(&args.bus.to_string(), args.bitrate);
     interrupt::listen()?;
     // Also restores the terminal in a panic.
     let mut terminal = ratatui::init();
@@ -66,6 +71,7 @@ fn watch(
             }
         }
         monitor.tick(microseconds(SystemTime::now()));
+        monitor.missed(link.lost());
         while event::poll(Duration::ZERO).map_err(on_screen)? {
             match event::read().map_err(on_screen)? {
                 Event::Key(key) if key.kind == KeyEventKind::Press => match key.code {

@@ -126,7 +126,9 @@ impl Picture {
     fn head(&self, width: usize) -> Vec<Line<'static>> {
         let load = self.window.as_ref().map_or("-".to_owned(), |window| {
             let load = window.interfaces.first().map_or(0.0, |bus| bus.load);
-            format!("{:.1} %", load * 100.0)
+            let [nominal, data] =
+                [window.bitrate, window.data_bitrate].map(|rate| f64::from(rate) / 1e6);
+            format!("{:.1} % of {nominal}/{data} Mbit/s", load * 100.0)
         });
         let mut bus = vec![
             Span::styled(self.title.clone(), BOLD),
@@ -136,6 +138,9 @@ impl Picture {
         if self.total.error_frames > 0 {
             let count = self.total.error_frames;
             bus.push(Span::styled(format!("{count} error frames"), ALARM));
+        }
+        if self.missed > 0 {
+            bus.push(Span::styled(format!("{} missed", self.missed), ALARM));
         }
         let mut lines = pages::flow(bus, width);
         lines.extend(pages::flow(self.state_spans(), width));

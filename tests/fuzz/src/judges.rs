@@ -26,7 +26,7 @@ pub(crate) fn judges(bytes: &[u8]) {
     let mut checker = Checker::new(&arm);
     let mut replay = Replay::new(config.controller());
     let mut plot = Plot::new(&arm, "a log");
-    let mut monitor = Monitor::new("a log");
+    let mut monitor = Monitor::new("a log", BitTiming::default());
     // After a difference, what a replay says means nothing.
     let mut differs = false;
     for record in records(bytes) {
