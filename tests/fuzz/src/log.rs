@@ -58,7 +58,17 @@ pub(crate) fn log(bytes: &[u8]) {
             .collect()
     };
     assert_eq!(statistics.frames, frames(&records).len() as u64);
-    assert!(!(statistics.to_string() + &statistics.histograms()).contains("NaN"));
+    let ids = statistics.interfaces.iter().flat_map(|bus| &bus.ids);
+    for id in ids {
+        assert!(id.rate_hz.is_finite() && id.load.is_finite(), "{id:?}");
+        if let Some(period) = &id.period {
+            assert!(period.mean_ms.is_finite() && period.jitter_ms.is_finite());
+            assert!(period.min_ms <= period.mean_ms && period.mean_ms <= period.max_ms);
+            let [low, high] = period.range_90_ms;
+            assert!(period.min_ms <= low && low <= high && high <= period.max_ms);
+        }
+    }
+    assert!(!(statistics.to_string() + &statistics.histograms()).is_empty());
     serde_json::to_string(&statistics).unwrap();
     for target in [Target::Candump, Target::Pcapng] {
         assert_eq!(convert(&records, target), records, "{target:?}");
