@@ -217,6 +217,24 @@ fn nothing_that_is_there_is_replaced() {
     Recording::create(&at("empty.log"), None).unwrap();
 }
 
+/// Exit codes: 2 where the name is wrong, 1 where the bus is not there; neither leaves a file.
+#[test]
+fn a_recording_that_cannot_begin_leaves_nothing() {
+    let folder = tempdir().unwrap();
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let bus = format!("slcan:tcp:{}", server.local_addr().unwrap());
+    let output = record(&bus, Path::new("/dev/null"), &[])
+        .wait_with_output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    drop(server);
+    let output = record(&bus, &folder.path().join("bus.log"), &[])
+        .wait_with_output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert_eq!(names(&folder), [""; 0]);
+}
+
 /// A file that has appeared in the meantime stays, and so does what was recorded.
 #[test]
 fn a_name_taken_while_recording_is_left_alone() {

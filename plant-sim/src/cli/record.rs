@@ -35,18 +35,18 @@ pub(super) struct RecordArgs {
 
 /// Records until a signal arrives.
 pub(super) fn run(args: &RecordArgs) -> Result<(), Failure> {
-    let failed = |error: RecordError| error.to_string();
-    let mut recording = Recording::create(&args.out, args.rotate).map_err(failed)?;
+    // The bus first: without one, no file is left behind.
+    let mut link = Link::watch(&args.bus).map_err(|error| error.to_string())?;
+    let mut recording = Recording::create(&args.out, args.rotate).map_err(|error| match error {
+        RecordError::Write { .. } => Failure::failed(error.to_string()),
+        _ => Failure::usage(error.to_string()),
+    })?;
     interrupt::listen()?;
+    say!("plant-sim: recording {}; Ctrl-C ends it", args.bus);
     let begun = Instant::now();
-    let ended = Link::watch(&args.bus)
-        .map_err(|error| error.to_string())
-        .and_then(|mut link| {
-            say!("plant-sim: recording {}; Ctrl-C ends it", args.bus);
-            record(&mut link, &args.bus, &mut recording)
-        });
+    let ended = record(&mut link, &args.bus, &mut recording);
     // However it ended, the recording gets its name.
-    let recorded = recording.finish().map_err(failed)?;
+    let recorded = recording.finish().map_err(|error| error.to_string())?;
     let lost = ended?;
     show(&format!(
         "{} frames and {} error frames in {:.3} s, {} bytes in {} files\n",
