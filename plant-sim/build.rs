@@ -1,6 +1,8 @@
 //! Version and commit for `--version` of `plant-sim` and of the controller on a host:
 //! `0.1.0 (abc1234, 2026-11-28)`, with `modified` where the sources differ from the commit.
 
+#![allow(clippy::expect_used, reason = "a build fails by panicking")]
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -1,5 +1,13 @@
 //! The pins of the cabinet, on recording pins.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use core::convert::Infallible;
 use std::cell::Cell;
 

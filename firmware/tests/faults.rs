@@ -1,5 +1,13 @@
 //! The fault table: against a second copy written by hand, and against the docs.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::fmt::Write;
 
 use firmware::control::fault::{Latch, Limit, REACTIONS, Reaction};

@@ -1,5 +1,13 @@
 //! Properties of the drive train: the two directions are inverses, power is conserved, and friction only dissipates it.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod common;
 
 use common::{U, acceleration, assert_close, position, speed, within};

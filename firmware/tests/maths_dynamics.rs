@@ -2,6 +2,14 @@
 //!
 //! The bounds are numbers of roundings times the magnitudes of `common::magnitude`.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod common;
 
 use common::magnitude::{self, LAGRANGE, NEWTON_EULER};

@@ -1,6 +1,14 @@
 //! The elementary functions against the host's f64 functions: dense sweeps for the stated errors, arbitrary bits for
 //! totality.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod common;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

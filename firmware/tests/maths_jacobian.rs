@@ -1,6 +1,14 @@
 //! Properties of the differential kinematics: the Jacobian is the derivative of the pose, its inverses invert
 //! it, and damping bounds the speeds.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod common;
 
 use common::{U, arm, assert_close, position, speed, within};

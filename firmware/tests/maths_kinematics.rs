@@ -1,5 +1,13 @@
 //! Properties of the kinematics: forward and inverse undo each other, velocities agree, and limits hold.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod common;
 
 use std::f64::consts::TAU;

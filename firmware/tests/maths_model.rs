@@ -1,5 +1,13 @@
 //! Validation of models: good models pass, and every number that breaks its rule is named.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod common;
 
 use common::{arm, irb_930_short, payload};

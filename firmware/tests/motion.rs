@@ -1,6 +1,14 @@
 //! Planned motion against the limits of the robot, judged by the recursive Newton-Euler dynamics, which the
 //! planner does not use.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use firmware::mechanics::arm::{ArmModel, IRB_930, Payload};
 use firmware::mechanics::body::Body;
 use firmware::mechanics::dynamics::newton_euler;

@@ -3,6 +3,14 @@
 //! A code counts as raised when the source of the node names it. Whether it is raised when it should be is for other
 //! tests; this one makes sure that the docs of a code do not promise more than exists.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::fs;
 use std::path::Path;
 

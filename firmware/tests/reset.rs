@@ -1,5 +1,13 @@
 //! The record of the last stop in memory of arbitrary content.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use firmware::cabinet::reset::{Record, Stop};
 use proptest::prelude::*;
 use protocol::messages::ResetReason;

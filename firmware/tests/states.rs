@@ -1,5 +1,13 @@
 //! The state machine: every state and every event, judged by the control word for the drives.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::fmt::Write;
 
 use firmware::control::controller::{Config, Controller, Readings};

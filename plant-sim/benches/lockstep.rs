@@ -2,6 +2,14 @@
 //!
 //! `cargo bench -p plant-sim` reports samples per second; at 1 kHz, 1000 is real time.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "an example or a benchmark of the built-in files"
+)]
+
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use plant_sim::run::execute;
 use sim::run::in_process;

@@ -1,5 +1,13 @@
 //! Prints the kinds of faults as a Markdown table, for docs/faults.md.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "an example or a benchmark of the built-in files"
+)]
+
 use sim::faults::{KINDS, Kind};
 
 fn main() {

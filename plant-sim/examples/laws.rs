@@ -2,6 +2,14 @@
 //!
 //! Arguments are control rates in Hz; default 1000.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "an example or a benchmark of the built-in files"
+)]
+
 use sim::run::in_process;
 use sim::scenario::Scenario;
 use sim::setup::RunConfig;

@@ -1,5 +1,13 @@
 //! Worst-case load of the bus by control rate, for docs/protocol.md.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "an example or a benchmark of the built-in files"
+)]
+
 use protocol::wire::BitTiming;
 use sim::bus::{MAX_LOAD, Overload};
 use sim::rig;

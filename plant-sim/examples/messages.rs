@@ -1,5 +1,13 @@
 //! The messages of the link, for docs/protocol.md.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "an example or a benchmark of the built-in files"
+)]
+
 use protocol::messages::Node;
 use protocol::schema::Rate;
 use protocol::table::TABLE;

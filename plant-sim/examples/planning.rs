@@ -1,5 +1,13 @@
 //! Time from a move's request to its answer, which is the time of planning, for docs/motion.md.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "an example or a benchmark of the built-in files"
+)]
+
 use std::collections::BTreeMap;
 
 use protocol::codec;

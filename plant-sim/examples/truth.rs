@@ -1,5 +1,13 @@
 //! The columns of truth.csv, as docs/truth.md shows them.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "an example or a benchmark of the built-in files"
+)]
+
 use sim::record::TRUTH_COLUMNS;
 
 fn main() {

@@ -26,6 +26,11 @@
 //! its line of `trace.log`. With `--controller external` or `qemu` the rig passes it to [`external`] or [`qemu`], which
 //! send it through a link or a FIFO, wait for the answers, and compare them with those of the twin.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    reason = "an index or an expectation names an invariant of this crate; one that breaks is its own fault"
+)]
 #![forbid(unsafe_code)]
 // They panic where standard output or error is full or gone; `say!` and the sinks of results do not.
 #![deny(clippy::print_stderr, clippy::print_stdout)]

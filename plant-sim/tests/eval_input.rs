@@ -1,5 +1,13 @@
 //! What `eval` accepts and prints, and its refusals.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use plant_sim::eval::{By, Table, eval};
 use sim::model::RobotModel;
 

@@ -1,5 +1,13 @@
 //! Every exit code of docs/exit-codes.md, as a shell sees it.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::fs;
 use std::process::{Command, Output, exit};
 

@@ -1,5 +1,13 @@
 //! The monitor's picture of a bus with known traffic.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use plant_sim::monitor::{Monitor, View};
 use protocol::codec;
 use protocol::frame::{CanFrame, StandardId};

@@ -1,5 +1,13 @@
 //! Traces played onto a serial line with a socket of the test at its other end. SocketCAN: `tests/ci/10-vcan.sh`.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::io::Read;
 use std::net::{TcpListener, TcpStream};
 use std::thread;

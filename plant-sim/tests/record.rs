@@ -1,5 +1,13 @@
 //! Buses recorded: over slcan, whose other end is a socket of the test. SocketCAN: `tests/ci/12-peers.sh`.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::fs::{self, File};
 use std::io::{BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};

@@ -1,5 +1,13 @@
 //! A node reset by network management counts from its start: neither check nor statistics treat that as a violation.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use firmware::mechanics::arm::IRB_930;
 use plant_sim::check::{Checker, Offence};
 use protocol::codec;

@@ -1,5 +1,13 @@
 //! `--version` names the commit that the program was built from.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::process::Command;
 
 fn text(command: &mut Command) -> Option<String> {

@@ -1,5 +1,13 @@
 //! The message table against CANopen (CiA 301), and which messages may go without protection.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use protocol::e2e::Profile;
 use protocol::messages::*;
 use protocol::schema::Content;

@@ -1,5 +1,13 @@
 //! Codec: every wrong frame is refused with its cause.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod common;
 
 use common::{Bytes, frame_of, protected};

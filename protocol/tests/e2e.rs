@@ -1,6 +1,14 @@
 //! End-to-end protection: the CRCs against the published catalogue, their definition and the error classes that they
 //! guarantee to find, and the counter against an unbounded count.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod common;
 
 use common::{Bytes, bitwise_crc, crc8, crc16};

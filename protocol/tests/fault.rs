@@ -1,5 +1,13 @@
 //! Faults as text, and how much of them an emergency keeps.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use protocol::messages::{Cause, DriveStatus, Emergency, Fault, FaultAxis, KnownAnswer};
 
 /// Expected sentences written by hand.

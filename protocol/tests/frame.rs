@@ -1,5 +1,13 @@
 //! Frames have the lengths of ISO 11898-1, and an impossible frame cannot be built.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use proptest::prelude::*;
 use protocol::frame::{
     CanFrame, ExtendedId, FrameKind, Id, StandardId, fd_length, fd_length_of_dlc,

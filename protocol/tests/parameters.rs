@@ -1,5 +1,13 @@
 //! The parameter table and the server that both nodes share.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::collections::{HashMap, HashSet};
 
 use proptest::prelude::*;

@@ -1,5 +1,13 @@
 //! slcan against the CAN232 manual, the bytes of python-can, and garbage.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use proptest::prelude::*;
 use protocol::frame::{CanFrame, ExtendedId, Id, StandardId};
 use protocol::slcan::{Line, MAX_LINE, Parser, SlcanError, Text};

@@ -10,6 +10,13 @@
 //! A missing, ragged or misspelt table is a broken test, not a condition to handle, so every accessor panics with the
 //! file, line and column that it wanted.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    reason = "for tests, which fail by panicking"
+)]
+
 use std::path::PathBuf;
 
 use nalgebra::{SMatrix, SVector};

@@ -1,5 +1,13 @@
 //! The plant against Pinocchio and MuJoCo, quantity by quantity.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use nalgebra::{SMatrix, Vector4};
 use sim::model::{Payload, RobotModel};
 use sim::plant::arm::Arm;

@@ -1,5 +1,13 @@
 //! The whole loop in lock-step: controller, CAN frames, drives and plant, judged by the truth.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use sim::metrics::RmsMax;
 use sim::model::RobotModel;
 use sim::record::TraceLog;

@@ -1,5 +1,13 @@
 //! The reference tables piped through `eval`, whole, and compared column by column.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use plant_sim::eval::{By, Table, eval};
 use sim::model::{Payload, RobotModel};
 use tests::reference;

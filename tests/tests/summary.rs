@@ -1,5 +1,13 @@
 //! The summary of a run compared with its truth and its configuration.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::io;
 
 use sim::model::RobotModel;

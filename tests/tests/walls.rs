@@ -1,6 +1,14 @@
 //! The architecture of docs/architecture.md holds: dependencies between crates and between the modules of a crate, and
 //! the length of a file.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;

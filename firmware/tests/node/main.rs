@@ -1,5 +1,13 @@
 //! The node on a simulated bus: what it answers, refuses and ignores.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod bench;
 mod faults;
 mod parameters;

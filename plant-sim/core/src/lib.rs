@@ -30,6 +30,11 @@
 //! plant is integrated up to that instant with the old torques and from there with the new ones. [`metrics`] evaluates
 //! the true state of the sample.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    reason = "an index or an expectation names an invariant of this crate; one that breaks is its own fault"
+)]
 #![forbid(unsafe_code)]
 #![deny(clippy::disallowed_methods, clippy::print_stdout, clippy::print_stderr)]
 

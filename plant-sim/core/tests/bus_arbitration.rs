@@ -1,5 +1,13 @@
 //! The bus as a discrete-event system: which frame wins, when, and that the statistics add up.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::collections::{BTreeMap, HashMap};
 
 use proptest::prelude::*;

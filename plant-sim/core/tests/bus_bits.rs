@@ -1,6 +1,14 @@
 //! Frame lengths against a second derivation: every frame is built bit by bit, CRC, stuff count and fixed stuff bits
 //! included, and counted.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use proptest::prelude::*;
 use protocol::frame::{CanFrame, ExtendedId, FrameKind, Id, StandardId};
 use protocol::wire::{BitTiming, FrameBits, TimingError};

@@ -1,5 +1,13 @@
 //! The drawn data agree with the run.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::io;
 
 use base64::Engine as _;

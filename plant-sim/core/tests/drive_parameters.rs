@@ -1,5 +1,13 @@
 //! Parameters of the drives, requested like the controller does, and the round trip from an operator.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use protocol::codec::{decode, encode};
 use protocol::frame::CanFrame;
 use protocol::messages::{

@@ -1,5 +1,13 @@
 //! Planned faults: what is written is what happens, nothing else happens, and the arm stops for the right cause.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::io;
 
 use protocol::frame::CanFrame;

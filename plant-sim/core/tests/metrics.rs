@@ -1,5 +1,13 @@
 //! Metrics of motions whose times and errors are worked out by hand.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::f64::consts::PI;
 
 use protocol::messages::Mode;

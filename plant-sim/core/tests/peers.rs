@@ -1,5 +1,13 @@
 //! Failing peers, as wrappers of working ones, and how a run ends with them.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{EStop, EStopReason, Message, Mode};

@@ -1,5 +1,13 @@
 //! Devices of the arm: brake, end stops, motors, encoders, payloads.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use nalgebra::Vector4;
 use proptest::prelude::*;
 use sim::model::{Payload, RobotModel};

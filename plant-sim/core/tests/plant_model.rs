@@ -1,5 +1,13 @@
 //! Model files: what is accepted, and the messages of refusals.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use sim::model::{Payload, RobotModel};
 
 const DEFAULT: &str = include_str!("../../models/irb930-22-1.05.json");

@@ -1,5 +1,13 @@
 //! The plant over time, against conservation laws and closed forms.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use nalgebra::Vector4;
 use sim::model::{Payload, RobotModel};
 use sim::plant::Plant;

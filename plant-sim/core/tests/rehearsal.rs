@@ -1,5 +1,13 @@
 //! A rehearsal says what a run will come to; the run is the oracle.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use sim::rehearsal::{RehearsalError, rehearse};
 use sim::run::in_process;
 use sim::scenario::{Change, Scenario};

@@ -1,5 +1,13 @@
 //! Scenario texts: what is refused before anything runs, with place and allowed values.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use sim::scenario::{Scenario, Source};
 use sim::setup::RunConfig;
 

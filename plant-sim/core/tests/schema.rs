@@ -1,5 +1,13 @@
 //! What the schemas of files promise is what the readers do: the keys, and the ranges of every number.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use schemars::{JsonSchema, schema_for};
 use serde_json::{Value, json};
 use sim::model::file::{ModelFile, PayloadFile};

@@ -1,5 +1,13 @@
 //! The trace tools against traces of known content: made here frame by frame, or by a run.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod check;
 mod decode;
 mod run;

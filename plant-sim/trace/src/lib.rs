@@ -25,6 +25,11 @@
 //! reports it. `##` introduces an FD frame, its first digit holds the flags. The [`Reader`] also accepts candump's
 //! screen output, Vector ASC and pcapng.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    reason = "an index or an expectation names an invariant of this crate; one that breaks is its own fault"
+)]
 #![forbid(unsafe_code)]
 
 pub mod convert;

@@ -1,5 +1,13 @@
 //! The DBC has the contents of the table, within the limits of the format. Other tools read it in `tests/ci`.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::collections::HashSet;
 
 use protocol::schema::Kind;

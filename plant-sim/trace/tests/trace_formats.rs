@@ -1,5 +1,13 @@
 //! Logs in the formats of other tools, reading back what is written, and selections of a trace.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use protocol::frame::{CanFrame, ExtendedId, StandardId};
 use trace::convert::{Converter, Target};
 use trace::select::Selection;

@@ -1,5 +1,13 @@
 //! candump logs: output equals that of can-utils and reads back; errors are named.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::io::{self, BufReader, Cursor};
 
 use proptest::prelude::*;

@@ -1,6 +1,14 @@
 //! Addresses of links, and the serial link against a scripted peer. SocketCAN needs a kernel with CAN:
 //! `tests/ci/10-vcan.sh`.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time::Duration;

@@ -4,6 +4,13 @@
 //! to the same bytes, what is accepted runs. `tests/ci/23-fuzz.sh` has libFuzzer search for bytes that break one;
 //! `cargo test -p fuzz` runs what is in `corpus`, seeds and found crashes alike, where Rust is all there is.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "an example or a benchmark of the built-in files"
+)]
 #![forbid(unsafe_code)]
 
 mod arguments;

@@ -5,6 +5,14 @@
 //! the model's decimals to f32. The latter have a relative error of u in an angle, and its sine or cosine moves by as
 //! much, u in a speed, 2 u in its square, and 3 u in a product of up to three model parameters.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod dynamics;
 mod inverse;
 mod kinematics;

@@ -5,6 +5,14 @@
 //! the numbers in it. An oracle is never the controller and never the paper: the tables of Pinocchio, a derivative of
 //! positions, a conservation law, or linear algebra.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod arm;
 mod dynamic_control;
 mod energy;

@@ -29,6 +29,7 @@ mod planted {
             defmt::warn!("planted: {=str}", fault.name());
             match fault {
                 Fault::HardFault => asm::udf(),
+                #[expect(clippy::panic, reason = "this is the planted one")]
                 Fault::Panic => panic!("planted"),
                 Fault::StackOverflow => {
                     overflow(0);

@@ -5,6 +5,14 @@
 //! articulated-body algorithm on dense 6 x 6 matrices. A second check runs the plant's own algorithms in six
 //! dimensions, to test their reduction to the plane.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 mod chain;
 mod oracle;
 mod spatial;

@@ -1,5 +1,12 @@
 //! libFuzzer on the target that the variable `FUZZ_TARGET` names; `tests/ci/23-fuzz.sh` builds and calls it.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "an example or a benchmark of the built-in files"
+)]
 #![no_main]
 
 use std::env;

@@ -1,5 +1,13 @@
 //! Whatever one end of the channel writes, the other reads back.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use channel::{
     Channel, FRAME_LEN, Fault, Measured, REPLY_FRAMES, REPLY_HEADER, Reply, Request, Setup,
     frame_from_bytes, frame_to_bytes, greeted, greeting, is_greeting, reply_header,

@@ -44,6 +44,7 @@ const FILTERS: [(StandardFilterSlot, u16); 6] = [
 ];
 
 /// Time quanta of 12.5 ns. Nominal: 1 + 63 + 16, sample point at 80 %.
+#[allow(clippy::unwrap_used, reason = "evaluated when the image is compiled")]
 const NOMINAL: NominalBitTiming = NominalBitTiming {
     prescaler: NonZeroU16::MIN,
     seg1: NonZeroU8::new(63).unwrap(),
@@ -51,6 +52,7 @@ const NOMINAL: NominalBitTiming = NominalBitTiming {
     sync_jump_width: NonZeroU8::new(16).unwrap(),
 };
 /// Data: 1 + 11 + 4, sample point at 75 %.
+#[allow(clippy::unwrap_used, reason = "evaluated when the image is compiled")]
 const DATA: DataBitTiming = DataBitTiming {
     transceiver_delay_compensation: true,
     prescaler: NonZeroU16::MIN,
