@@ -143,19 +143,11 @@ impl Plant {
         self.saturated
     }
 
-    /// Which motors are at their limit now. A command at the limit to single precision counts as being at it.
+    /// Which motors are at their limit now; none while they are off.
     pub fn at_limit(&self) -> [bool; 4] {
         let speed = self.drive.to_motor(&self.qd);
-        std::array::from_fn(|i| {
-            let (braking, driving) = self.drive.torque_bounds(i, speed[i]);
-            let rounding = f64::from(f32::EPSILON) * driving.max(-braking);
-            self.torque_enabled
-                && match self.request[i] {
-                    up if up > 0.0 => up >= driving - rounding,
-                    down if down < 0.0 => down <= braking + rounding,
-                    _ => false,
-                }
-        })
+        let at_limit = self.drive.at_limit(&self.request, &speed);
+        at_limit.map(|limited| limited && self.torque_enabled)
     }
 
     /// Switches all motors on or off. The last command is kept.

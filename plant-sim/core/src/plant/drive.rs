@@ -128,4 +128,18 @@ impl Drive {
             request[i].clamp(least, greatest)
         })
     }
+
+    /// Which of the motors the command `request` (N m) takes to their limit at motor speeds `speed` (rad/s). At the limit to
+    /// single precision counts.
+    pub fn at_limit(&self, request: &Vector4<f64>, speed: &Vector4<f64>) -> [bool; 4] {
+        std::array::from_fn(|i| {
+            let (braking, driving) = self.torque_bounds(i, speed[i]);
+            let rounding = f64::from(f32::EPSILON) * driving.max(-braking);
+            match request[i] {
+                up if up > 0.0 => up >= driving - rounding,
+                down if down < 0.0 => down <= braking + rounding,
+                _ => false,
+            }
+        })
+    }
 }
