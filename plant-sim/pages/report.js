@@ -18,7 +18,7 @@ function again({ results }, number, all) {
 function report() {
     const runs = JSON.parse(document.getElementById("runs").textContent).map((about) => new Run(about));
     const board = new Board();
-    const ran = board.section("What ran", table(runs), ...runs.flatMap(again));
+    const ran = board.section("Run", table(runs), ...runs.flatMap(again));
     document.querySelector("main").replaceChildren(element("h1", {}, document.title), ...runs.map(title), ...board.parts, ran, board.dock);
     board.show(runs);
 

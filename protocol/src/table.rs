@@ -53,12 +53,12 @@ pub static ESTOP: MessageInfo = MessageInfo {
     signals: signals::ESTOP,
 };
 
-/// Emergency of the drives.
+/// Emergency of the drives. Reserved: not sent yet.
 pub static DRIVES_EMERGENCY: MessageInfo = emergency_of("DrivesEmergency", Node::Drives);
 /// Emergency of the controller.
 pub static CONTROLLER_EMERGENCY: MessageInfo =
     emergency_of("ControllerEmergency", Node::Controller);
-/// Emergency of the operator.
+/// Emergency of the operator. Reserved: not sent yet.
 pub static OPERATOR_EMERGENCY: MessageInfo = emergency_of("OperatorEmergency", Node::Operator);
 
 const fn emergency_of(name: &'static str, node: Node) -> MessageInfo {
@@ -188,12 +188,12 @@ const fn request_of(name: &'static str, server: Server, client: Node) -> Message
     }
 }
 
-/// Heartbeat of the drives.
+/// Heartbeat of the drives. Reserved: not sent yet.
 pub static DRIVES_HEARTBEAT: MessageInfo = heartbeat_of("DrivesHeartbeat", Node::Drives);
 /// Heartbeat of the controller.
 pub static CONTROLLER_HEARTBEAT: MessageInfo =
     heartbeat_of("ControllerHeartbeat", Node::Controller);
-/// Heartbeat of the operator.
+/// Heartbeat of the operator. Reserved: not sent yet.
 pub static OPERATOR_HEARTBEAT: MessageInfo = heartbeat_of("OperatorHeartbeat", Node::Operator);
 
 const fn heartbeat_of(name: &'static str, node: Node) -> MessageInfo {
