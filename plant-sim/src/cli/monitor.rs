@@ -41,9 +41,9 @@ pub(super) fn run(args: &MonitorArgs) -> Result<(), Failure> {
             "monitor draws on a terminal; use candump and `plant-sim trace` for files",
         ));
     }
+    interrupt::listen()?;
     let mut link = Link::watch(&args.bus).map_err(|error| error.to_string())?;
     let monitor = Monitor::new(&args.bus.to_string(), args.bitrate);
-    interrupt::listen()?;
     // Also restores the terminal in a panic.
     let mut terminal = ratatui::init();
     let result = watch(&mut link, monitor, &mut terminal);

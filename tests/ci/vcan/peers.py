@@ -232,7 +232,7 @@ class Monitor:
         self.pid = pid
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
-        await_true("monitor", lambda: sockets("vcan0") > before)
+        await_true("monitor", lambda: sockets("vcan0") > before and "socketcan:vcan0" in self.screen.display[0])
         return self
 
     def read(self):
