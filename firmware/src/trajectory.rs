@@ -22,7 +22,7 @@ use crate::mechanics::arm::ArmModel;
 use path::{Path, PathError, PathPoint};
 use profile::{SCurve, Sample};
 
-/// Where the arm should be: joint positions and their first three time derivatives.
+/// Where the arm should be: joint positions and their first two time derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
     /// Joint positions: rad, rad, m, rad.
@@ -31,8 +31,6 @@ pub struct Reference {
     pub qd: Vector4<f32>,
     /// Joint accelerations: rad/s^2, rad/s^2, m/s^2, rad/s^2.
     pub qdd: Vector4<f32>,
-    /// Joint jerks: rad/s^3, rad/s^3, m/s^3, rad/s^3.
-    pub qddd: Vector4<f32>,
 }
 
 impl Reference {
@@ -42,7 +40,37 @@ impl Reference {
             q,
             qd: Vector4::zeros(),
             qdd: Vector4::zeros(),
-            qddd: Vector4::zeros(),
+        }
+    }
+}
+
+/// How the arm should move, wherever it is: units as in [`Reference`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rates {
+    /// Joint velocities.
+    pub qd: Vector4<f32>,
+    /// Joint accelerations.
+    pub qdd: Vector4<f32>,
+}
+
+/// What the arm is to follow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setpoint {
+    /// At the sampling instant.
+    pub reference: Reference,
+    /// When the command acts.
+    pub ahead: Rates,
+}
+
+impl Setpoint {
+    /// At rest at `q`.
+    pub fn rest(q: Vector4<f32>) -> Self {
+        Self {
+            reference: Reference::rest(q),
+            ahead: Rates {
+                qd: Vector4::zeros(),
+                qdd: Vector4::zeros(),
+            },
         }
     }
 }
@@ -60,6 +88,25 @@ pub struct Lift {
     pub down_start: f32,
 }
 
+impl Lift {
+    /// d3 and its derivatives at `t`. The descent begins no sooner than the rise has ended.
+    fn at(&self, t: f32) -> Sample {
+        let t_down = t - self.down_start;
+        if t_down > 0.0 {
+            let Sample { s, v, a } = self.down.at(t_down);
+            let top = self.from - self.up.distance();
+            Sample { s: top + s, v, a }
+        } else {
+            let Sample { s, v, a } = self.up.at(t);
+            Sample {
+                s: self.from - s,
+                v: -v,
+                a: -a,
+            }
+        }
+    }
+}
+
 /// A planned move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trajectory {
@@ -75,8 +122,6 @@ pub struct Trajectory {
     pub span: f32,
     /// Time scale, 0 < scale <= 1: the move lasts `span / time_scale`.
     pub time_scale: f32,
-    /// Largest joint accelerations of the move at full speed: those a stop may use for braking.
-    pub braking: Vector4<f32>,
     /// Joint positions at the end.
     pub end: Vector4<f32>,
     /// Sequence number that the operator gave the move.
@@ -94,39 +139,73 @@ impl Trajectory {
     /// # Errors
     /// A line that has not been surveyed by the planner may leave the reach; a planned one cannot.
     pub fn at(&self, arm: &ArmModel, t: f32) -> Result<Reference, PathError> {
-        let t = t * self.time_scale;
-        let Sample { s, v, a, j } = self.profile.at(t - self.start);
-        let mut reference = match &self.path {
-            // The same as below without the terms that are zero here: nearly every move is of this kind.
-            Path::Joint { start, delta } => Reference {
-                q: start + delta * s,
-                qd: delta * v,
-                qdd: delta * a,
-                qddd: delta * j,
+        self.evaluate(arm, t, None).map(|setpoint| setpoint.reference)
+    }
+
+    /// As [`Trajectory::at`], and how the arm should move `lead` seconds later: at the place of that instant, but for the third
+    /// derivative of a line, which a few milliseconds leave without effect.
+    ///
+    /// # Errors
+    /// As [`Trajectory::at`].
+    pub fn follow(&self, arm: &ArmModel, t: f32, lead: f32) -> Result<Setpoint, PathError> {
+        self.evaluate(arm, t, Some(lead))
+    }
+
+    /// With or without a look ahead, in one copy.
+    #[inline(never)]
+    fn evaluate(
+        &self,
+        arm: &ArmModel,
+        t: f32,
+        lead: Option<f32>,
+    ) -> Result<Setpoint, PathError> {
+        let scale = self.time_scale;
+        let later = lead.map(|lead| (t + lead) * scale);
+        let t = t * scale;
+        let now = self.profile.at(t - self.start);
+        let then = later.map_or(now, |later| self.profile.at(later - self.start));
+        let mut setpoint = match &self.path {
+            // As below, without what is zero: nearly every move is one of these.
+            Path::Joint { start, delta } => Setpoint {
+                reference: Reference {
+                    q: start + delta * now.s,
+                    qd: delta * now.v,
+                    qdd: delta * now.a,
+                },
+                ahead: Rates {
+                    qd: delta * then.v,
+                    qdd: delta * then.a,
+                },
             },
             path @ Path::Line { .. } => {
-                let PathPoint { q, dq, ddq } = path.at(arm, s)?;
-                Reference {
-                    q,
-                    qd: dq * v,
-                    qdd: dq * a + ddq * (v * v),
-                    // The third path derivative is left out: it only feeds the extrapolation within a sample.
-                    qddd: dq * j + ddq * (3.0 * v * a),
+                let PathPoint { q, dq, ddq } = path.at(arm, now.s)?;
+                let dq_then = dq + ddq * (then.s - now.s);
+                Setpoint {
+                    reference: Reference {
+                        q,
+                        qd: dq * now.v,
+                        qdd: dq * now.a + ddq * (now.v * now.v),
+                    },
+                    ahead: Rates {
+                        qd: dq_then * then.v,
+                        qdd: dq_then * then.a + ddq * (then.v * then.v),
+                    },
                 }
             }
         };
+        let Setpoint { reference, ahead } = &mut setpoint;
         if let Some(lift) = &self.lift {
-            let up = lift.up.at(t);
-            let down = lift.down.at(t - lift.down_start);
-            reference.q.z = lift.from - up.s + down.s;
-            reference.qd.z = down.v - up.v;
-            reference.qdd.z = down.a - up.a;
-            reference.qddd.z = down.j - up.j;
+            let now = lift.at(t);
+            let then = later.map_or(now, |later| lift.at(later));
+            reference.q.z = now.s;
+            (reference.qd.z, reference.qdd.z) = (now.v, now.a);
+            (ahead.qd.z, ahead.qdd.z) = (then.v, then.a);
         }
-        let scale = self.time_scale;
+        let squared = scale * scale;
         reference.qd *= scale;
-        reference.qdd *= scale * scale;
-        reference.qddd *= scale * scale * scale;
-        Ok(reference)
+        reference.qdd *= squared;
+        ahead.qd *= scale;
+        ahead.qdd *= squared;
+        Ok(setpoint)
     }
 }

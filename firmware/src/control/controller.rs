@@ -31,7 +31,7 @@ use crate::mechanics::arm::ArmModel;
 use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::clamp;
-use crate::trajectory::Reference;
+use crate::trajectory::{Reference, Setpoint};
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use requests::Answer;
 
@@ -257,7 +257,7 @@ impl Controller {
         }
     }
 
-    /// One sample. Worst case: one trajectory evaluation and one control law. Planning is not part
+    /// One sample. Worst case: one trajectory evaluation, one more look ahead and one control law. Planning is not part
     /// of it: call [`Controller::plan`] once the command is on its way.
     pub fn step<P: Probe>(&mut self, readings: &Readings, probe: &mut P) -> Actions {
         let drive = &self.body.drive;
@@ -278,10 +278,12 @@ impl Controller {
             self.excess = Vector4::zeros();
             return self.torque_off();
         }
-        self.reference = self.advance(readings.steps.min(self.max_gap));
-        let reference = &self.reference;
         let period = self.config.period.seconds();
         let lead = self.setup.command_delay + 0.5 * period;
+        let before = self.reference;
+        let Setpoint { reference, ahead } = self.advance(readings.steps.min(self.max_gap), lead);
+        self.reference = reference;
+        let reference = &self.reference;
         self.error = reference.q - q;
 
         let motion = Motion {
@@ -289,9 +291,10 @@ impl Controller {
             qd,
             torque: measured_torque,
             reference,
-            mean_qd: mean_velocity(reference, period),
-            qd_ahead: reference.qd + reference.qdd * lead + reference.qddd * (0.5 * lead * lead),
-            qd_aheadd: reference.qdd + reference.qddd * lead,
+            before_qd: before.qd,
+            mean_qd: mean_velocity(&before, reference, readings.steps, period),
+            qd_ahead: ahead.qd,
+            qdd_ahead: ahead.qdd,
             period,
             excess: self.excess,
         };
@@ -346,7 +349,16 @@ impl Controller {
     }
 }
 
-/// Mean velocity over the sample that ends at `reference`, exact for constant jerk.
-fn mean_velocity(reference: &Reference, period: f32) -> Vector4<f32> {
-    reference.qd - reference.qdd * (0.5 * period) + reference.qddd * (period * period / 6.0)
+/// Mean velocity over the sample that ends at `reference`, exact for constant jerk since the reference `before`.
+fn mean_velocity(
+    before: &Reference,
+    reference: &Reference,
+    steps: u32,
+    period: f32,
+) -> Vector4<f32> {
+    if steps > 1 {
+        // That reference is older than the sample.
+        return reference.qd - reference.qdd * (0.5 * period);
+    }
+    0.5 * (before.qd + reference.qd) + (before.qdd - reference.qdd) * (period / 12.0)
 }

@@ -1,8 +1,6 @@
 //! The clock of a trajectory: runs with the samples, or is braked to a stop on the path.
 
-use nalgebra::Vector4;
-
-use super::Reference;
+use super::{Rates, Reference};
 use crate::mechanics::arm::JointLimits;
 use crate::mechanics::math::sqrt;
 
@@ -37,6 +35,11 @@ impl Clock {
         (self.ticks as f32 + self.fraction) * period
     }
 
+    /// How fast time on the trajectory passes.
+    pub fn time_scale(&self) -> f32 {
+        self.time_scale
+    }
+
     /// Whether a stop has come to rest.
     pub fn is_stopped(&self) -> bool {
         self.time_scale <= 0.0
@@ -53,29 +56,29 @@ impl Clock {
         }
     }
 
-    /// Chooses the next slope of a stop: as steep as `braking` (the joint accelerations that the plan itself uses) and
-    /// the jerk limit allow, flattening towards rest. The arm stays on its path. `reference` is the trajectory's own,
-    /// before [`Clock::apply`].
+    /// Chooses the next slope of a stop: as steep as `steepest` (of the torque) and no joint's acceleration passes its limit,
+    /// as its jerk allows, and flattening towards rest. The arm stays on its path. `reference` is the trajectory's own, before
+    /// [`Clock::apply`].
     pub fn brake(
         &mut self,
         reference: &Reference,
-        braking: &Vector4<f32>,
+        steepest: f32,
         limits: &JointLimits,
         period: f32,
     ) {
-        let mut steepest = f32::MAX;
+        let mut steepest = steepest;
         let mut bend = f32::MAX;
-        for (((qd, qdd), available), jerk) in reference
+        for (((qd, qdd), acceleration), jerk) in reference
             .qd
             .iter()
             .zip(reference.qdd.iter())
-            .zip(braking.iter())
+            .zip(limits.acceleration.iter())
             .zip(limits.jerk.iter())
         {
             let speed = qd.abs();
             if speed * period > f32::EPSILON {
                 let own = self.time_scale * self.time_scale * if *qd > 0.0 { *qdd } else { -*qdd };
-                steepest = steepest.min((available + own).max(0.0) / speed);
+                steepest = steepest.min((acceleration + own).max(0.0) / speed);
                 bend = bend.min(STOP_JERK_SHARE * jerk / speed);
             }
         }
@@ -90,14 +93,17 @@ impl Clock {
         self.slope = -next;
     }
 
-    /// The reference as traversed by the braked clock.
-    pub fn apply(&self, reference: &Reference) -> Reference {
-        let (r, slope) = (self.time_scale, self.slope);
-        Reference {
-            q: reference.q,
-            qd: reference.qd * r,
-            qdd: reference.qdd * (r * r) + reference.qd * slope,
-            qddd: reference.qddd * (r * r * r) + reference.qdd * (3.0 * r * slope),
+    /// The velocities and accelerations of the trajectory as the clock runs through them, `later` seconds from now.
+    pub fn apply(&self, rates: &Rates, later: f32) -> Rates {
+        let scale = (self.time_scale + self.slope * later).max(0.0);
+        Rates {
+            qd: rates.qd * scale,
+            qdd: rates.qdd * (scale * scale) + rates.qd * self.slope,
         }
+    }
+
+    /// Time that passes on the trajectory in the next `later` seconds.
+    pub fn lead(&self, later: f32) -> f32 {
+        ((self.time_scale + 0.5 * self.slope * later) * later).max(0.0)
     }
 }

@@ -125,7 +125,6 @@ impl Planner {
                 lift: None,
                 span: 0.0,
                 time_scale: 1.0,
-                braking: Vector4::zeros(),
                 end: Vector4::zeros(),
                 sequence: 0,
             },
@@ -220,7 +219,6 @@ impl Planner {
         self.draft.start = 0.0;
         self.draft.lift = None;
         self.draft.time_scale = 1.0;
-        self.draft.braking = Vector4::zeros();
         // For a path along which nothing moves.
         self.draft.profile = SCurve::default();
         self.stage = Stage::Survey {

@@ -8,8 +8,7 @@ use super::clock::Clock;
 use super::planner::Planner;
 use super::request::Request;
 use super::torque_budget::TorqueBudget;
-use super::{Reference, Trajectory};
-use crate::mechanics::arm::ArmModel;
+use super::{Rates, Reference, Setpoint, Trajectory};
 
 /// Capacity for requests, and as many planned moves.
 pub const CAPACITY: usize = 4;
@@ -23,7 +22,20 @@ pub enum Progress {
     Arrived,
 }
 
-/// All requested motion that has not ended.
+/// How far the motion goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Samples since the last reference.
+    pub steps: u32,
+    /// Sampling period, s.
+    pub period: f32,
+    /// From the sampling instant until the command acts, s.
+    pub lead: f32,
+    /// Whether the arm is to come to rest, on its path.
+    pub stopping: bool,
+}
+
+/// All motion that an operator has asked for and that has not ended.
 #[derive(Clone, Debug)]
 pub struct MoveQueue {
     requests: Deque<Request, CAPACITY>,
@@ -127,35 +139,46 @@ impl MoveQueue {
         ))
     }
 
-    /// The reference after `steps` more samples of `period` seconds, braking on the path while `stopping`. Without a
-    /// move the arm stays at `here`.
+    /// What to follow next. Without a move the arm stays at `here`.
     pub fn advance(
         &mut self,
-        arm: &ArmModel,
-        steps: u32,
-        period: f32,
-        stopping: bool,
+        budget: &TorqueBudget<'_>,
+        pace: &Pace,
         here: &Vector4<f32>,
-    ) -> (Reference, Progress) {
+    ) -> (Setpoint, Progress) {
+        let Pace {
+            steps,
+            period,
+            lead,
+            stopping,
+        } = *pace;
         let Some(trajectory) = self.moves.front() else {
-            return (Reference::rest(*here), Progress::Arrived);
+            return (Setpoint::rest(*here), Progress::Arrived);
         };
         for _ in 0..steps {
             self.clock.advance(period);
         }
         let t = self.clock.time(period);
         let ended = t >= trajectory.duration();
-        // A verified path stays in reach; should rounding disagree, the arm holds its position.
-        let planned = trajectory
-            .at(arm, t)
-            .unwrap_or_else(|_| Reference::rest(*here));
+        // A verified path stays in reach; should arithmetic disagree, the arm holds.
+        let Ok(planned) = trajectory.follow(budget.arm, t, self.clock.lead(lead)) else {
+            return (Setpoint::rest(*here), Progress::UnderWay);
+        };
         if stopping {
-            self.clock
-                .brake(&planned, &trajectory.braking, &arm.limits, period);
+            let Setpoint { reference, ahead } = planned;
+            let room = budget.braking_room(&reference, self.clock.time_scale());
+            let limits = &budget.arm.limits;
+            self.clock.brake(&reference, room, limits, period);
             if ended || self.clock.is_stopped() {
-                return (Reference::rest(planned.q), Progress::Arrived);
+                return (Setpoint::rest(reference.q), Progress::Arrived);
             }
-            return (self.clock.apply(&planned), Progress::UnderWay);
+            let Reference { q, qd, qdd } = reference;
+            let Rates { qd, qdd } = self.clock.apply(&Rates { qd, qdd }, 0.0);
+            let setpoint = Setpoint {
+                reference: Reference { q, qd, qdd },
+                ahead: self.clock.apply(&ahead, lead),
+            };
+            return (setpoint, Progress::UnderWay);
         }
         if ended {
             self.completed = trajectory.sequence;

@@ -15,6 +15,9 @@ use crate::mechanics::math::{cbrt, clamp, sqrt};
 /// exactly, and a saturated axis leaves the path.
 pub const TORQUE_SHARE: f32 = 0.93;
 
+/// Share of the torque that a stop may use: more than a plan, so that the plan's own peaks do not keep a stop from braking.
+const STOP_SHARE: f32 = 0.97;
+
 /// The limits of one arm with one payload, as the planner uses them.
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueBudget<'a> {
@@ -25,30 +28,61 @@ pub struct TorqueBudget<'a> {
 }
 
 impl TorqueBudget<'_> {
-    /// Factor by which the path acceleration of `along` could grow before the first joint torque reaches its share;
-    /// huge where the sample needs hardly any torque.
+    /// By what factor the path acceleration of `along` could grow before the first torque
+    /// reaches its share; huge where the sample needs hardly any.
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
+        let push = here.dq * along.a;
+        let rest = Reference {
+            q: here.q,
+            qd: here.dq * along.v,
+            qdd: here.ddq * (along.v * along.v),
+        };
+        // Less than a hundredth of the limit: another sample decides.
+        self.room(&rest, &push, TORQUE_SHARE, 0.01)
+    }
+
+    /// How fast the clock that runs through a trajectory at `time_scale` may be braked, 1/s, before the first torque reaches
+    /// what a stop may use. `reference` is the trajectory's own. With a load on the lift the two directions differ: its
+    /// weight brakes a rise, and takes most of the force on the way down.
+    pub fn braking_room(&self, reference: &Reference, time_scale: f32) -> f32 {
+        let rest = Reference {
+            q: reference.q,
+            qd: reference.qd * time_scale,
+            qdd: reference.qdd * (time_scale * time_scale),
+        };
+        self.room(&rest, &-reference.qd, STOP_SHARE, 0.0).max(0.0)
+    }
+
+    /// By what factor the accelerations `push` could grow before they and `rest` together need more than a `share` of the
+    /// torque of a joint or motor; those that need no more than a part `least` of it for `push` are left out.
+    // Out of line, for the size of two copies.
+    #[inline(never)]
+    fn room(&self, rest: &Reference, push: &Vector4<f32>, share: f32, least: f32) -> f32 {
         let Self { arm, body } = self;
-        let trig = Trig::in_line(&here.q);
-        let qd = here.dq * along.v;
-        let push = body.inertial(&trig, &(here.dq * along.a));
-        let rest = body.inertial(&trig, &(here.ddq * (along.v * along.v)))
-            + body.lagrange.bias(&trig, &qd)
+        let Reference { q, qd, qdd } = rest;
+        let trig = Trig::in_line(q);
+        let push = body.inertial(&trig, push);
+        let rest = body.inertial(&trig, qdd)
+            + body.lagrange.bias(&trig, qd)
             + body.lagrange.gravity()
-            + arm.drive.viscous.component_mul(&qd)
-            + body.drive.coulomb_friction(&qd);
+            + arm.drive.viscous.component_mul(qd)
+            + body.drive.coulomb_friction(qd);
+        let (joint, motor) = self.torque_limits(share);
         let mut room = f32::MAX;
-        for ((push, rest), limit) in push.iter().zip(rest.iter()).zip(self.torque().iter()) {
-            let (need, rest) = if *push < 0.0 {
+        let mut narrow = |push: f32, rest: f32, limit: f32| {
+            let (need, rest) = if push < 0.0 {
                 (-push, -rest)
             } else {
-                (*push, *rest)
+                (push, rest)
             };
-            // Less than a hundredth of the limit: another sample decides.
-            if need > 0.01 * limit {
+            if need > least * limit {
                 room = room.min((limit - rest) / need);
             }
+        };
+        for ((push, rest), limit) in push.iter().zip(rest.iter()).zip(joint.iter()) {
+            narrow(*push, *rest, *limit);
         }
+        narrow(self.wrist_motor(&push), self.wrist_motor(&rest), motor);
         room
     }
 
@@ -58,7 +92,7 @@ impl TorqueBudget<'_> {
     /// [`RefusalReason::TorqueTooSmall`] with the axis and the torque, which no time scale reduces.
     pub fn check_creep(&self) -> Result<(), Refusal> {
         let torque = self.body.lagrange.gravity().abs() + self.arm.drive.coulomb;
-        let (joint, motor) = self.torque_limits();
+        let (joint, motor) = self.torque_limits(TORQUE_SHARE);
         let refuse = |axis: Axis, value: f32, limit: f32| {
             Err(Refusal {
                 reason: RefusalReason::TorqueTooSmall,
@@ -92,8 +126,8 @@ impl TorqueBudget<'_> {
         let b = arm.drive.viscous.component_mul(qd);
         let c = body.lagrange.gravity() + body.drive.coulomb_friction(qd);
         let full = a + b + c;
-        let (joint, motor) = self.torque_limits();
-        // Nearly every sample is within its limits unscaled: nothing to solve.
+        let (joint, motor) = self.torque_limits(TORQUE_SHARE);
+        // Nearly every sample keeps its limits as it is: then there is nothing to solve.
         if within(&full, &joint) && self.wrist_motor(&full).abs() <= motor {
             return 1.0;
         }
@@ -105,13 +139,13 @@ impl TorqueBudget<'_> {
             .min(scale_within(wrist(&a), wrist(&b), wrist(&c), motor))
     }
 
-    /// Torques that a plan may use: of the joints, limited by themselves and by the motors that turn one joint each,
-    /// and of the wrist motor, which also carries part of the lift's force.
-    fn torque_limits(&self) -> (Vector4<f32>, f32) {
-        let motor = self.arm.drive.motor_torque_limit * TORQUE_SHARE;
+    /// A share of the torques: of the joints, as they and the motors that turn one joint each allow, and of the motor of the
+    /// wrist, which carries part of the lift's force, too.
+    fn torque_limits(&self, share: f32) -> (Vector4<f32>, f32) {
+        let motor = self.arm.drive.motor_torque_limit;
         let mut own = self.body.drive.own_torque(&motor).abs();
         own.w = f32::MAX;
-        (self.torque().inf(&own), motor.w)
+        (self.arm.limits.effort.inf(&own) * share, motor.w * share)
     }
 
     fn wrist_motor(&self, torque: &Vector4<f32>) -> f32 {
@@ -126,9 +160,14 @@ impl TorqueBudget<'_> {
         if speed > limit { limit / speed } else { 1.0 }
     }
 
-    /// The largest time scale, at most 1, at which `reference` uses no more than `share` of the limits
+    /// The largest time scale, at most 1, at which `reference` and the joint jerks `qddd` use no more than `share` of the limits
     /// of speed, acceleration and jerk.
-    pub fn derivative_scale(&self, reference: &Reference, share: f32) -> f32 {
+    pub fn derivative_scale(
+        &self,
+        reference: &Reference,
+        qddd: &Vector4<f32>,
+        share: f32,
+    ) -> f32 {
         let limits = &self.arm.limits;
         let speed = ratio(&(limits.velocity * share), &reference.qd);
         let motor = ratio(
@@ -136,7 +175,7 @@ impl TorqueBudget<'_> {
             &self.body.drive.motor_speed(&reference.qd),
         );
         let acceleration = ratio(&(limits.acceleration * share), &reference.qdd);
-        let jerk = ratio(&(limits.jerk * share), &reference.qddd);
+        let jerk = ratio(&(limits.jerk * share), qddd);
         let mut scale = speed.min(motor);
         if acceleration < 1.0 {
             scale = scale.min(sqrt(acceleration));

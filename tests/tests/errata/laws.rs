@@ -58,16 +58,16 @@ impl Controller {
             q: reference.q.cast(),
             qd: reference.qd.cast(),
             qdd: reference.qdd.cast(),
-            qddd: Vector4::zeros(),
         };
         let motion = Motion {
             q,
             qd: qd.cast(),
             torque: Vector4::zeros(),
             reference: &reference,
+            before_qd: reference.qd,
             mean_qd: reference.qd,
             qd_ahead: reference.qd,
-            qd_aheadd: reference.qdd,
+            qdd_ahead: reference.qdd,
             period: 1e-3,
             excess: Vector4::zeros(),
         };

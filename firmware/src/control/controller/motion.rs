@@ -4,8 +4,8 @@ use protocol::messages::{Outcome, Refusal, RefusalReason};
 
 use super::Controller;
 use crate::control::states::{Event, State};
-use crate::trajectory::Reference;
-use crate::trajectory::queue::Progress;
+use crate::trajectory::Setpoint;
+use crate::trajectory::queue::{Pace, Progress};
 use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Controller {
@@ -22,7 +22,8 @@ impl Controller {
     /// Continues planning: one step per millisecond of the sampling period, at least one. Kept out of the path from
     /// measurement to command, which it would delay. Returns whether there was anything to plan.
     pub fn plan(&mut self) -> bool {
-        if !self.state.is_powered() || !self.queue.has_to_plan() {
+        // Where a stop will end is not known before; and a sample that brakes has no time to plan.
+        if !self.state.is_powered() || self.state.is_stopping() || !self.queue.has_to_plan() {
             return false;
         }
         let budget = TorqueBudget {
@@ -42,32 +43,36 @@ impl Controller {
         true
     }
 
-    /// The reference at this sample.
-    pub(super) fn advance(&mut self, steps: u32) -> Reference {
+    /// What to follow at this sample.
+    pub(super) fn advance(&mut self, steps: u32, lead: f32) -> Setpoint {
         if self.state == State::Enabled {
             if !self.queue.is_ready() {
-                return Reference::rest(self.reference.q);
+                return Setpoint::rest(self.reference.q);
             }
             self.event(Event::Start);
         }
         let stopping = self.state.is_stopping();
-        let (reference, progress) = self.queue.advance(
-            &self.config.arm,
+        let budget = TorqueBudget {
+            arm: &self.config.arm,
+            body: &self.body,
+        };
+        let pace = Pace {
             steps,
-            self.config.period.seconds(),
+            period: self.config.period.seconds(),
+            lead,
             stopping,
-            &self.reference.q,
-        );
+        };
+        let (setpoint, progress) = self.queue.advance(&budget, &pace, &self.reference.q);
         match progress {
             Progress::UnderWay => {}
             Progress::Arrived if stopping => {
-                self.queue.clear(&reference.q);
+                self.queue.clear(&setpoint.reference.q);
                 self.event(Event::AtRest);
             }
             Progress::Arrived => {
                 self.event(Event::Arrived);
             }
         }
-        reference
+        setpoint
     }
 }

@@ -18,7 +18,7 @@ pub fn torque(
 ) -> Vector4<f32> {
     let motion = input.motion;
     let error = motion.position_error();
-    let mut acceleration = motion.qd_aheadd
+    let mut acceleration = motion.qdd_ahead
         + motion.velocity_error() * gains.derivative()
         + error * gains.proportional();
     if compensation == Compensation::Integral {

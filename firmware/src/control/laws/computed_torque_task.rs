@@ -23,7 +23,7 @@ pub fn torque(
         pull += memory.integrate(&task.position, motion) * gains.integral();
     }
     let desired =
-        task.desired.task_velocity(&motion.qd_aheadd) + task.desired.bias(&motion.qd_ahead);
+        task.desired.task_velocity(&motion.qdd_ahead) + task.desired.bias(&motion.qd_ahead);
     let carried = task.actual.bias(&motion.measured_qd_ahead());
     let acceleration = task.actual.joint_speed_damped(&(desired - carried + pull));
     computed_torque::realise(input, &acceleration, gains, compensation, memory)

@@ -37,18 +37,21 @@ impl MomentumObserver {
     /// one.
     pub fn update(&mut self, motion: &Motion<'_>, model: &Model, corner: f32) -> Vector4<f32> {
         let period = motion.period;
-        let momentum = &model.mass * &motion.qd;
+        // Velocities are means over a sample and stand for its middle. The inertia is that of its end: half a sample of the
+        // change M' qd = C qd + C^T qd takes the momentum back to the middle.
+        let momentum = &model.mass * &motion.qd
+            - (model.bias + model.kinetic_gradient) * (0.5 * period);
         if !self.started {
             self.started = true;
             self.expected = momentum;
             self.previous_torque = motion.torque;
             return self.residual;
         }
-        // Velocities are means over a sample and so belong to its middle: between two of them, the
-        // second half of one torque sample and the first half of the next act.
+        // Between two such velocities act the second half of one torque sample and the first half of the next, and the
+        // friction of the instant between them.
         let torque = 0.5 * (motion.torque + self.previous_torque);
         self.previous_torque = motion.torque;
-        let known = model.gravity + model.friction;
+        let known = model.gravity + model.friction_before;
         self.expected += (torque + model.kinetic_gradient - known + self.residual) * period;
         let corner = corner.min(0.5 / period);
         self.residual = (momentum - self.expected) * corner;

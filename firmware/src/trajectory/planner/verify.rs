@@ -24,19 +24,17 @@ impl Planner {
         time_scale: f32,
         before: Option<(f32, Vector4<f32>)>,
     ) -> Result<(), Refusal> {
-        let mut reference = self.draft.at(budget.arm, t).map_err(from_path)?;
+        let reference = self.draft.at(budget.arm, t).map_err(from_path)?;
         let mut time_scale = time_scale.min(budget.torque_scale(&reference));
         if matches!(self.draft.path, Path::Line { .. }) {
-            // The joint accelerations vary between the samples: part of the jerk shows only in their difference.
-            if let Some((earlier, qdd)) = before {
-                reference.qddd = (reference.qdd - qdd) / (t - earlier);
-            }
-            time_scale = time_scale.min(budget.derivative_scale(&reference, LINE_SHARE));
+            let jerk = before.map_or_else(Vector4::zeros, |(earlier, qdd)| {
+                (reference.qdd - qdd) / (t - earlier)
+            });
+            time_scale = time_scale.min(budget.derivative_scale(&reference, &jerk, LINE_SHARE));
         } else {
             // The profile keeps each joint within its own limits; but lift and wrist share a motor.
             time_scale = time_scale.min(budget.lift_motor_scale(&reference.qd));
         }
-        self.draft.braking = self.draft.braking.sup(&reference.qdd.abs());
         self.stage = if t < self.draft.span {
             Stage::Verify {
                 t: self.next_sample(t),
@@ -58,7 +56,6 @@ impl Planner {
         // Past the end, so that rounding in the last sample cannot leave the arm short of it.
         let past = self.draft.span + 1.0;
         self.draft.end = self.draft.at(budget.arm, past).map_err(from_path)?.q;
-        self.draft.braking *= time_scale * time_scale;
         self.draft.time_scale = time_scale * self.speed;
         self.stage = Stage::Idle;
         Ok(())
