@@ -139,7 +139,8 @@ impl Trajectory {
     /// # Errors
     /// A line that has not been surveyed by the planner may leave the reach; a planned one cannot.
     pub fn at(&self, arm: &ArmModel, t: f32) -> Result<Reference, PathError> {
-        self.evaluate(arm, t, None).map(|setpoint| setpoint.reference)
+        self.evaluate(arm, t, None)
+            .map(|setpoint| setpoint.reference)
     }
 
     /// As [`Trajectory::at`], and how the arm should move `lead` seconds later: at the place of that instant, but for the third
@@ -153,12 +154,7 @@ impl Trajectory {
 
     /// With or without a look ahead, in one copy.
     #[inline(never)]
-    fn evaluate(
-        &self,
-        arm: &ArmModel,
-        t: f32,
-        lead: Option<f32>,
-    ) -> Result<Setpoint, PathError> {
+    fn evaluate(&self, arm: &ArmModel, t: f32, lead: Option<f32>) -> Result<Setpoint, PathError> {
         let scale = self.time_scale;
         let later = lead.map(|lead| (t + lead) * scale);
         let t = t * scale;

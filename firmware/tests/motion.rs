@@ -168,16 +168,59 @@ proptest! {
         let Ok(trajectory) = plan(&IRB_930, &payload, &from, target, 1.0) else { return Ok(()) };
         check(&IRB_930, &payload, &trajectory)?;
         // The gate: while the tool is within the clearance above one of its ends, it is vertically above it.
+        let mut highest = f32::MIN;
         for i in 0..=400 {
             let t = trajectory.duration() * i as f32 / 400.0;
             let r = trajectory.at(&IRB_930, t).unwrap();
             let tool = kinematics::forward(&IRB_930.geometry, &r.q);
-            prop_assert!(tool.z <= top + 1e-5);
+            highest = highest.max(tool.z);
             let near = |p: &Pose| (tool.x - p.x).hypot(tool.y - p.y) < 1e-4;
             if tool.z < -0.3 + clearance.min(rise) - 1e-4 {
                 prop_assert!(near(&pose(r0, a0)) || near(&pose(r1, a1)), "t {t} z {}", tool.z);
             }
         }
+        prop_assert!(highest >= top - 1e-5, "{highest} {top}");
+    }
+
+    /// Free corners: never below the chamfer of the nearer end, whatever the heights; and never slower than the sharp rectangle.
+    #[test]
+    fn free_corners_keep_the_chamfer(
+        r0 in 0.4f32..0.95, a0 in -1.5f32..1.5, r1 in 0.4f32..0.95, a1 in -1.5f32..1.5,
+        near in prop::option::of(0.005f32..0.08), z0 in -0.4f32..-0.2, z1 in -0.4f32..-0.2,
+        rise in 0.0f32..0.07, yaw in -3.0f32..3.0, mass in 0.0f32..22.0, speed in 0.2f32..1.0,
+    ) {
+        let payload = Payload { mass, ..two_kg() };
+        let start = Pose { x: r0 * a0.cos(), y: r0 * a0.sin(), z: z0, yaw: 0.0 };
+        let end = match near {
+            // Short ones, where one stroke runs into the other.
+            Some(way) => Pose { x: start.x + way * a1.cos(), y: start.y + way * a1.sin(), z: z1, yaw },
+            None => Pose { x: r1 * a1.cos(), y: r1 * a1.sin(), z: z1, yaw },
+        };
+        // With both ends over each other neither is the nearer one.
+        prop_assume!((start.x - end.x).hypot(start.y - end.y) > 5e-3);
+        let top = z0.max(z1) + rise;
+        let Ok(from) = kinematics::inverse(&IRB_930, &start, kinematics::Elbow::Positive, &Vector4::zeros())
+        else { return Ok(()) };
+        let to = |clearance| {
+            plan(&IRB_930, &payload, &from, Target::Jump { pose: end, top, clearance }, speed)
+        };
+        let Ok(trajectory) = to(0.0) else { return Ok(()) };
+        check(&IRB_930, &payload, &trajectory)?;
+        for i in 0..=1000 {
+            let t = trajectory.duration() * i as f32 / 1000.0;
+            let r = trajectory.at(&IRB_930, t).unwrap();
+            let tool = kinematics::forward(&IRB_930.geometry, &r.q);
+            let away = |p: &Pose| (tool.x - p.x).hypot(tool.y - p.y);
+            let nearer = if away(&start) < away(&end) { start } else { end };
+            let chamfer = away(&nearer).min(top - nearer.z);
+            // Rounding of f32 kinematics, and the first micrometres of both curves.
+            prop_assert!(tool.z - nearer.z > chamfer - 3e-5, "t {t} {tool:?} {}", tool.z - nearer.z - chamfer);
+        }
+        let rectangle = to(1.0).unwrap();
+        prop_assert!(
+            trajectory.duration() <= rectangle.duration() * 1.001,
+            "{} {}", trajectory.duration(), rectangle.duration()
+        );
     }
 
     #[test]

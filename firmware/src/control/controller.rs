@@ -31,8 +31,8 @@ use crate::mechanics::arm::ArmModel;
 use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::clamp;
-use crate::trajectory::{Reference, Setpoint};
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
+use crate::trajectory::{Reference, Setpoint};
 use requests::Answer;
 
 /// Planning steps per millisecond of the sampling period.

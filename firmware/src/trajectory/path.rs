@@ -99,29 +99,32 @@ impl Path {
     }
 }
 
-/// First joint limit that `q` violates.
+/// First joint limit that `q` violates. On the way `from` a place past a limit, as an arm that stands on one is by half an
+/// encoder count, no further past it than there.
 ///
 /// # Errors
-/// [`IkError::Limit`] with the axis, the value and the violated limit.
-pub fn check_limits(arm: &ArmModel, q: &Vector4<f32>) -> Result<(), IkError> {
+/// [`IkError::Limit`] with the axis, the value and the limit passed.
+pub fn check_limits(
+    arm: &ArmModel,
+    q: &Vector4<f32>,
+    from: Option<&Vector4<f32>>,
+) -> Result<(), IkError> {
     let limits = &arm.limits;
-    for (((axis, value), lower), upper) in Axis::ALL
-        .into_iter()
-        .zip(q.iter())
-        .zip(limits.lower.iter())
-        .zip(limits.upper.iter())
-    {
+    let lower = from.map_or(limits.lower, |from| limits.lower.inf(from));
+    let upper = from.map_or(limits.upper, |from| limits.upper.sup(from));
+    for axis in Axis::ALL {
+        let value = axis.of(q);
         if !value.is_finite() {
             return Err(IkError::NotFinite);
         }
-        let limit = if value < lower { lower } else { upper };
-        if value < lower || value > upper {
-            return Err(IkError::Limit {
-                axis,
-                value: *value,
-                limit: *limit,
-            });
-        }
+        let limit = if value < axis.of(&lower) {
+            axis.of(&limits.lower)
+        } else if value > axis.of(&upper) {
+            axis.of(&limits.upper)
+        } else {
+            continue;
+        };
+        return Err(IkError::Limit { axis, value, limit });
     }
     Ok(())
 }

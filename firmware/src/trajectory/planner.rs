@@ -1,11 +1,11 @@
 //! From a request to a trajectory, one bounded step at a time.
 //!
 //! ```text
-//! Locate --> Survey --> Stroke, Clear --> Compose --> Balance --> Compose --> Verify --> Finish
-//!   | path     | reach,    (jumps: both     ^            |           | one time scale that keeps
-//!   |          | limits,    vertical         +-- rounds --+           | every sample inside every
-//!   |          | speeds     parts)         S-curve whose accelerations | limit
-//!   |          |                           fill the torque limits
+//! Locate --> Survey --> Compose --> Balance --> Compose --> Jump --> Verify --> Finish
+//!   | path     | reach,    ^            |                   | strokes  | one time scale that keeps
+//!   |          | limits,   +-- rounds --+                   | over the | every sample inside every
+//!   |          | speeds    S-curve whose accelerations      | travel   | limit
+//!   |          |           fill the torque limits
 //!   +----------+----------------------------------------> Refusal (reason, axis, value, limit)
 //! ```
 //!
@@ -17,7 +17,7 @@
 //! trajectories*, 1984).
 
 mod balance;
-mod stroke;
+mod jump;
 mod survey;
 mod verify;
 
@@ -27,9 +27,10 @@ use protocol::messages::{Refusal, RefusalReason};
 use super::Trajectory;
 use super::path::{Path, PathPoint};
 use super::profile::{Bounds, SCurve};
-use super::request::{Gate, Request, Target, from_path};
+use super::request::{Request, Target, from_path};
 use super::torque_budget::TorqueBudget;
 use crate::mechanics::arm::ArmModel;
+use jump::{Chamfer, Jump};
 use verify::LINE_STEPS;
 
 /// Survey points on a line.
@@ -53,14 +54,6 @@ enum Stage {
         point: u8,
         fastest: Vector4<f32>,
     },
-    /// One vertical stroke of a jump.
-    Stroke {
-        down: bool,
-    },
-    /// Time at which that stroke passes the clearance.
-    Clear {
-        down: bool,
-    },
     /// Profile from the bounds, after this many corrections.
     Compose {
         round: u8,
@@ -70,6 +63,23 @@ enum Stage {
         point: u8,
         gain: [f32; 2],
     },
+    /// How much higher than asked for one stroke of a jump should go.
+    Raise {
+        down: bool,
+    },
+    /// Its profile.
+    Stroke {
+        down: bool,
+    },
+    /// How long the travel waits for it.
+    Lead {
+        down: bool,
+        knot: u8,
+        chamfer: Option<Chamfer>,
+        lead: f32,
+    },
+    /// Both strokes over the travel.
+    Overlay,
     Verify {
         /// Time of the sample, s.
         t: f32,
@@ -83,6 +93,15 @@ enum Stage {
     },
 }
 
+impl Stage {
+    /// The last pass, from its beginning.
+    const VERIFY: Self = Self::Verify {
+        t: 0.0,
+        time_scale: 1.0,
+        before: None,
+    };
+}
+
 /// Incremental planner; holds one request at a time.
 #[derive(Clone, Copy, Debug)]
 pub struct Planner {
@@ -91,10 +110,8 @@ pub struct Planner {
     bounds: Bounds,
     target: Target,
     speed: f32,
-    /// Heights of a jump.
-    gate: Option<Gate>,
-    /// Time from the beginning of the descent until the clearance is reached, s.
-    blended: f32,
+    /// Where the request is a jump.
+    jump: Option<Jump>,
 }
 
 impl Planner {
@@ -102,13 +119,12 @@ impl Planner {
     pub const MAX_STEPS: u32 = {
         let locate = 1;
         let survey = SURVEY_POINTS as u32 + 1;
-        let strokes = 4;
         let compose = ROUNDS as u32 + 1;
         let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
         // Its ends, and the borders of three profiles of seven segments.
         let verify = LINE_STEPS as u32 + 2 + 3 * 8;
         let finish = 1;
-        locate + survey + strokes + compose + balance + verify + finish
+        locate + survey + compose + balance + jump::STEPS + verify + finish
     };
 
     /// An idle planner.
@@ -136,8 +152,7 @@ impl Planner {
             },
             target: Target::Joints(Vector4::zeros()),
             speed: 1.0,
-            gate: None,
-            blended: 0.0,
+            jump: None,
         }
     }
 
@@ -174,12 +189,25 @@ impl Planner {
             Stage::Idle => return None,
             Stage::Locate => self.locate(budget.arm),
             Stage::Survey { point, fastest } => self.survey(budget, point, fastest),
+            Stage::Raise { down } => {
+                self.raise(budget, down);
+                Ok(())
+            }
             Stage::Stroke { down } => {
                 self.stroke(budget, down);
                 Ok(())
             }
-            Stage::Clear { down } => {
-                self.clear(down);
+            Stage::Lead {
+                down,
+                knot,
+                chamfer,
+                lead,
+            } => {
+                self.lead(budget.arm, down, knot, chamfer, lead);
+                Ok(())
+            }
+            Stage::Overlay => {
+                self.overlay();
                 Ok(())
             }
             Stage::Compose { round } => {
@@ -214,7 +242,7 @@ impl Planner {
             return Err(Refusal::value(RefusalReason::OutOfRange, self.speed, 1.0));
         }
         let (path, gate) = self.target.path(arm, &self.draft.end)?;
-        self.gate = gate;
+        self.jump = gate.map(Jump::new);
         self.draft.path = path;
         self.draft.start = 0.0;
         self.draft.lift = None;
@@ -232,32 +260,23 @@ impl Planner {
         self.draft.path.at(arm, s).map_err(from_path)
     }
 
-    /// Profile from the bounds, and the timing of a jump's strokes relative to it.
+    /// Profile from the bounds.
     fn compose(&mut self, round: u8) {
         let travels = self.bounds.speed > 0.0;
         if travels {
             self.draft.profile = SCurve::new(1.0, &self.bounds);
         }
-        let arrival = self.draft.start + self.draft.profile.duration();
-        self.draft.span = match &mut self.draft.lift {
-            None => arrival,
-            Some(lift) => {
-                lift.down_start = (arrival - self.blended).max(lift.up.duration());
-                lift.down_start + lift.down.duration()
-            }
-        };
+        self.draft.span = self.draft.profile.duration();
         self.stage = if travels && round < ROUNDS {
             Stage::Balance {
                 round,
                 point: 0,
                 gain: [STEP; 2],
             }
+        } else if self.jump.is_some() {
+            Stage::Raise { down: false }
         } else {
-            Stage::Verify {
-                t: 0.0,
-                time_scale: 1.0,
-                before: None,
-            }
+            Stage::VERIFY
         };
     }
 }

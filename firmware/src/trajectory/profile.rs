@@ -73,15 +73,40 @@ impl Half {
             (squared * w, 3.0 * squared)
         } else {
             let longer = squared / full;
-            (
-                0.5 * squared * (longer + full),
-                w * (2.0 * longer + full),
-            )
+            (0.5 * squared * (longer + full), w * (2.0 * longer + full))
         }
     }
 
     fn duration(&self) -> f32 {
         2.0 * self.ramp + self.hold
+    }
+
+    /// Time at which the half, from rest, has come as far as `s`, at most its distance.
+    fn time_at(&self, s: f32) -> f32 {
+        let Self {
+            jerk,
+            acceleration,
+            ramp,
+            hold,
+            speed,
+            distance,
+        } = *self;
+        // As in `at`, solved for the time.
+        let u = 0.5 * ramp + hold;
+        let shift = ramp * ramp / 24.0;
+        if 6.0 * s < acceleration * ramp * ramp {
+            return cbrt(6.0 * s / jerk);
+        }
+        if s < acceleration * (0.5 * u * u + shift) {
+            return 0.5 * ramp + sqrt(2.0 * (s / acceleration - shift));
+        }
+        // A cubic that bends less and less towards the end: from its tangent there the steps come nearer from one side.
+        let mut left = (distance - s) / speed;
+        for _ in 0..3 {
+            let bend = 0.5 * jerk * left * left;
+            left = (distance - s - bend * left * (2.0 / 3.0)) / (speed - bend);
+        }
+        self.duration() - left
     }
 
     /// First segment border after `t`; infinite from the end on. Both ramps have the same length, so time may run from
@@ -254,19 +279,36 @@ impl SCurve {
         }
     }
 
-    /// First time at which the coordinate has reached `s` (0 to the distance), to within 2^-14 of
-    /// the duration. Worst case: 14 evaluations.
-    pub fn time_at(&self, s: f32) -> f32 {
-        let (mut low, mut high) = (0.0, self.duration());
-        for _ in 0..14 {
-            let middle = 0.5 * (low + high);
-            if self.at(middle).s < s {
-                low = middle;
-            } else {
-                high = middle;
-            }
+    /// The same motion with time running backwards.
+    pub fn reversed(&self) -> Self {
+        Self {
+            accelerate: self.brake,
+            brake: self.accelerate,
+            ..*self
         }
-        high
+    }
+
+    /// First time at which the coordinate has reached `s`: 0 to the distance, which is not zero.
+    pub fn time_at(&self, s: f32) -> f32 {
+        let left = self.distance - s;
+        if s < self.accelerate.distance {
+            self.accelerate.time_at(s)
+        } else if left > self.brake.distance {
+            self.accelerate.duration() + (s - self.accelerate.distance) / self.accelerate.speed
+        } else {
+            self.duration() - self.brake.time_at(left.max(0.0))
+        }
+    }
+
+    /// The shortest distance whose profile speeds up over all of `way` (positive), so that it passes there as early as any.
+    pub fn run_out(way: f32, bounds: &Bounds) -> f32 {
+        let there_and_back = Bounds {
+            brake: bounds.accelerate,
+            ..*bounds
+        };
+        let jerk = bounds.jerk;
+        let speed = Self::new(2.0 * way, &there_and_back).accelerate.speed;
+        way + Half::new(sqrt(speed / jerk), bounds.brake / jerk, jerk).distance
     }
 }
 
@@ -299,7 +341,9 @@ mod tests {
                 prop_assert!(sample.a <= accelerate * 1.00001);
                 prop_assert!(-sample.a <= accelerate * ratio * 1.00001);
                 // Accelerations of f32, each off by 4 u.
-                let noise = 8.0 * f32::EPSILON * accelerate * ratio.max(1.0);
+                // And of f32 times.
+                let noise = 8.0 * f32::EPSILON * accelerate * ratio.max(1.0)
+                    + 2.0 * f32::EPSILON * duration * jerk;
                 prop_assert!((sample.a - before).abs() <= jerk * (h as f32) * 1.0001 + noise);
                 before = sample.a;
             }

@@ -37,6 +37,9 @@ pub struct Request {
     pub speed: f32,
 }
 
+/// Height that counts as none, m.
+const NO_HEIGHT: f32 = 1e-6;
+
 /// Heights of a jump, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Gate {
@@ -44,8 +47,10 @@ pub(super) struct Gate {
     pub(super) rise: f32,
     /// From the top to the end.
     pub(super) fall: f32,
-    /// Of the strictly vertical part at both ends.
+    /// Of the strictly vertical part at both ends; 0 where the corners are free.
     pub(super) clearance: f32,
+    /// How much higher than the top the lift could go.
+    pub(super) room: f32,
 }
 
 impl Target {
@@ -60,7 +65,7 @@ impl Target {
     ) -> Result<(Path, Option<Gate>), Refusal> {
         match self {
             Self::Joints(q) => {
-                check_limits(arm, q).map_err(from_ik)?;
+                check_limits(arm, q, None).map_err(from_ik)?;
                 Ok((straight(from, q), None))
             }
             Self::Line(pose) => Ok((line(arm, from, pose)?, None)),
@@ -114,11 +119,13 @@ fn gate(
     if !(top.is_finite() && clearance.is_finite()) {
         return Err(Refusal::because(RefusalReason::NotFinite));
     }
-    let d3_top = arm.geometry.d1 - arm.geometry.d4 - top;
+    let d3_top = zero_if_tiny(arm.geometry.d1 - arm.geometry.d4 - top - arm.limits.lower.z)
+        + arm.limits.lower.z;
     let mut highest = *to;
     highest.z = d3_top;
-    check_limits(arm, &highest).map_err(from_ik)?;
-    let (rise, fall) = (from.z - d3_top, to.z - d3_top);
+    check_limits(arm, &highest, None).map_err(from_ik)?;
+    let rise = zero_if_tiny(from.z - d3_top);
+    let fall = zero_if_tiny(to.z - d3_top);
     if rise < 0.0 || fall < 0.0 || clearance < 0.0 {
         return Err(Refusal::value(
             RefusalReason::OutOfRange,
@@ -130,7 +137,17 @@ fn gate(
         rise,
         fall,
         clearance,
+        room: (d3_top - arm.limits.lower.z).max(0.0),
     })
+}
+
+/// Less than a micrometre is what rounding and half an encoder count make of no height at all.
+fn zero_if_tiny(height: f32) -> f32 {
+    if height.abs() < NO_HEIGHT {
+        0.0
+    } else {
+        height
+    }
 }
 
 /// The refusal for an error of inverse kinematics.

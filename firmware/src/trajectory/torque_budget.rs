@@ -162,12 +162,7 @@ impl TorqueBudget<'_> {
 
     /// The largest time scale, at most 1, at which `reference` and the joint jerks `qddd` use no more than `share` of the limits
     /// of speed, acceleration and jerk.
-    pub fn derivative_scale(
-        &self,
-        reference: &Reference,
-        qddd: &Vector4<f32>,
-        share: f32,
-    ) -> f32 {
+    pub fn derivative_scale(&self, reference: &Reference, qddd: &Vector4<f32>, share: f32) -> f32 {
         let limits = &self.arm.limits;
         let speed = ratio(&(limits.velocity * share), &reference.qd);
         let motor = ratio(

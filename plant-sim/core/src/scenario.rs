@@ -21,11 +21,15 @@ pub use error::{Place, ScenarioError};
 pub use crate::text::Source;
 
 /// Scenarios that come with the program: name and text.
-const BUILT_IN: [(&str, &str); 4] = [
+const BUILT_IN: [(&str, &str); 5] = [
     ("gate", include_str!("../../scenarios/gate.toml")),
     (
         "gate-mismatch",
         include_str!("../../scenarios/gate-mismatch.toml"),
+    ),
+    (
+        "gate-vertical",
+        include_str!("../../scenarios/gate-vertical.toml"),
     ),
     ("square", include_str!("../../scenarios/square.toml")),
     (
@@ -243,11 +247,12 @@ pub struct Jump {
     #[serde(deserialize_with = "exactly")]
     #[schemars(transform = by(check::POSE))]
     pub to: [f64; 4],
-    /// z of the flange on its way across, m in frame 0: absolute, not relative to start or end.
+    /// Least z of the flange on its way across, m in frame 0: absolute, not relative to start or end.
     #[schemars(transform = by(check::LENGTH))]
     pub top: f64,
-    /// Length of the strictly vertical part at each end, m upwards from the flange at that end.
+    /// Length of the strictly vertical part at each end, m upwards from the flange at that end; 0 for free corners.
     #[schemars(transform = by(check::CLEARANCE))]
+    #[serde(default)]
     pub clearance: f64,
     /// Share of full speed.
     #[serde(default = "full")]

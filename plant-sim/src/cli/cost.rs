@@ -21,7 +21,7 @@ use super::{Failure, show};
 /// Arguments of `cost`.
 #[derive(Args)]
 pub(super) struct CostArgs {
-    /// What to run: gate, gate-mismatch, square, pick-place, or a scenario file.
+    /// What to run: gate, gate-mismatch, gate-vertical, square, pick-place, or a scenario file.
     #[arg(long, value_name = "NAME|FILE", default_value = "gate")]
     scenario: String,
     /// Control law, as for run; the default is the most expensive one.

@@ -27,7 +27,7 @@ use place::{Place, PlaceArgs};
 /// Arguments of `run`.
 #[derive(Args, Clone)]
 pub(super) struct RunArgs {
-    /// What to run: gate, gate-mismatch, square, pick-place, or a scenario file.
+    /// What to run: gate, gate-mismatch, gate-vertical, square, pick-place, or a scenario file.
     #[arg(long, value_name = "NAME|FILE", default_value = "gate")]
     scenario: String,
     #[command(flatten)]

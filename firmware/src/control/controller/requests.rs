@@ -131,7 +131,8 @@ impl Controller {
 
     fn enqueue(&mut self, sequence: u8, target: Target, speed: f32) -> Result<Answer, Refusal> {
         match self.state {
-            State::Enabled | State::Moving => {}
+            // Planned on as soon as it is known where the stop has ended.
+            State::Enabled | State::Moving | State::QuickStop => {}
             State::Ready | State::Enabling(_) => {
                 return Err(Refusal::because(RefusalReason::NotEnabled));
             }

@@ -39,8 +39,8 @@ impl MomentumObserver {
         let period = motion.period;
         // Velocities are means over a sample and stand for its middle. The inertia is that of its end: half a sample of the
         // change M' qd = C qd + C^T qd takes the momentum back to the middle.
-        let momentum = &model.mass * &motion.qd
-            - (model.bias + model.kinetic_gradient) * (0.5 * period);
+        let momentum =
+            &model.mass * &motion.qd - (model.bias + model.kinetic_gradient) * (0.5 * period);
         if !self.started {
             self.started = true;
             self.expected = momentum;

@@ -25,7 +25,9 @@ impl Planner {
         };
         let s = f32::from(point) / f32::from(points);
         let here = self.point(budget.arm, s)?;
-        check_limits(budget.arm, &here.q).map_err(from_ik)?;
+        // Until the plan is complete, this is where it starts.
+        let from = &self.draft.end;
+        check_limits(budget.arm, &here.q, Some(from)).map_err(from_ik)?;
         let limits = &budget.arm.limits;
         let fastest = fastest.sup(&here.dq.abs());
         if point == 0 {
@@ -46,11 +48,7 @@ impl Planner {
             // Nothing moves along the path: at most the lift of a jump does.
             self.bounds.speed = 0.0;
         }
-        self.stage = if self.gate.is_some() {
-            Stage::Stroke { down: false }
-        } else {
-            Stage::Compose { round: 0 }
-        };
+        self.stage = Stage::Compose { round: 0 };
         Ok(())
     }
 

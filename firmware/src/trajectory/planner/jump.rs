@@ -1,0 +1,286 @@
+//! The vertical strokes of a jump: how high they go, and how they lie over the travel in time.
+//!
+//! ```text
+//! Raise (both ends) --> Stroke, Stroke --> Lead (both ends) --> Overlay --> Verify
+//!                         ^------------ another height -----------+
+//! ```
+//!
+//! Its corners are free, but not below a chamfer: the tool stays higher above the nearer end than it is away from it, or as
+//! high as was asked for. A stroke that only just reaches that height brakes on its last half; so the
+//! top is raised to where the stroke passes the height as fast as it can, if the strokes still fit into the travel.
+
+use super::{NO_TRAVEL, Planner, Stage};
+use crate::mechanics::arm::ArmModel;
+use crate::mechanics::math::{sin_cos, sqrt};
+use crate::trajectory::Lift;
+use crate::trajectory::path::Path;
+use crate::trajectory::profile::{Bounds, SCurve};
+use crate::trajectory::request::Gate;
+use crate::trajectory::torque_budget::TorqueBudget;
+
+/// Bisections of the height by which the top is raised.
+const BISECTIONS: u8 = 3;
+/// Instants at which stroke and travel are compared at each end, and how many in one step.
+const KNOTS: u8 = 9;
+const KNOTS_A_STEP: u8 = 3;
+/// Steps of planning at the most.
+pub(super) const STEPS: u32 = {
+    let round = 2 + 2 * (KNOTS / KNOTS_A_STEP) as u32 + 1;
+    2 + (BISECTIONS as u32 + 2) * round
+};
+
+/// A jump that is being planned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Jump {
+    gate: Gate,
+    /// How much higher than asked for the top is, m: now, known to fit, and known not to; 0 is taken to fit.
+    raise: f32,
+    fits: f32,
+    too_high: f32,
+    round: u8,
+    /// From the end of the travel to that of the descent, s.
+    tail: f32,
+}
+
+impl Jump {
+    pub(super) fn new(gate: Gate) -> Self {
+        Self {
+            gate,
+            raise: 0.0,
+            fits: 0.0,
+            too_high: 0.0,
+            round: 0,
+            tail: 0.0,
+        }
+    }
+
+    /// Height of the gate above one end.
+    fn height(&self, down: bool) -> f32 {
+        if down { self.gate.fall } else { self.gate.rise }
+    }
+
+    /// Height above that end from which on the way across is free.
+    fn free_from(&self, down: bool) -> f32 {
+        let height = self.height(down);
+        if self.gate.clearance > 0.0 {
+            self.gate.clearance.min(height)
+        } else {
+            height
+        }
+    }
+
+    /// Bounds of one stroke; of the descent with time running backwards, so that both ends are alike.
+    fn bounds(&self, budget: &TorqueBudget<'_>, down: bool) -> Bounds {
+        let highest = self.gate.rise.max(self.gate.fall) + self.raise;
+        let (up, descent) = budget.lift(highest);
+        if down {
+            Bounds {
+                accelerate: descent.brake,
+                brake: descent.accelerate,
+                ..descent
+            }
+        } else {
+            up
+        }
+    }
+}
+
+/// What the lead at one end is worked out from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Chamfer {
+    /// Way of the tool across per unit of path, at the most, m.
+    pace: f32,
+    /// Time between two knots, s.
+    step: f32,
+    /// How much higher than the chamfer a knot has to be, so that the stroke is not lower between two, m.
+    margin: f32,
+}
+
+impl Planner {
+    /// How much higher the top has to be for the stroke at one end to pass the height of the gate without braking.
+    pub(super) fn raise(&mut self, budget: &TorqueBudget<'_>, down: bool) {
+        self.stage = Stage::Stroke { down: false };
+        let Some(jump) = &mut self.jump else { return };
+        let free_from = jump.free_from(down);
+        if free_from > NO_TRAVEL {
+            let bounds = jump.bounds(budget, down);
+            let wanted = SCurve::run_out(free_from, &bounds) - jump.height(down);
+            jump.too_high = jump.too_high.max(wanted.min(jump.gate.room));
+        }
+        if down {
+            jump.raise = jump.too_high;
+        } else {
+            self.stage = Stage::Raise { down: true };
+        }
+    }
+
+    /// The profile of one vertical stroke.
+    pub(super) fn stroke(&mut self, budget: &TorqueBudget<'_>, down: bool) {
+        let (Some(jump), Path::Joint { start, .. }) = (&self.jump, &self.draft.path) else {
+            return;
+        };
+        let lift = self.draft.lift.get_or_insert(Lift {
+            from: start.z,
+            up: SCurve::default(),
+            down: SCurve::default(),
+            down_start: 0.0,
+        });
+        let profile = stroke(jump.height(down) + jump.raise, &jump.bounds(budget, down));
+        self.stage = if down {
+            lift.down = profile.reversed();
+            Stage::Lead {
+                down: false,
+                knot: 0,
+                chamfer: None,
+                lead: 0.0,
+            }
+        } else {
+            lift.up = profile;
+            Stage::Stroke { down: true }
+        };
+    }
+
+    /// How long the travel has to wait for the stroke at one end: for the rise after the start, or, seen backwards, for the
+    /// descent before the end.
+    pub(super) fn lead(
+        &mut self,
+        arm: &ArmModel,
+        down: bool,
+        knot: u8,
+        chamfer: Option<Chamfer>,
+        lead: f32,
+    ) {
+        let (Some(jump), Some(lift)) = (&mut self.jump, &self.draft.lift) else {
+            return;
+        };
+        let (travel, stroke) = if down {
+            (self.draft.profile.reversed(), lift.down.reversed())
+        } else {
+            (self.draft.profile, lift.up)
+        };
+        let (free_from, beyond) = (jump.free_from(down), jump.free_from(!down));
+        let (mut knot, mut lead) = (knot, lead);
+        let mut chamfer = chamfer;
+        if free_from <= NO_TRAVEL || travel.distance() <= 0.0 {
+            // Nothing to wait for.
+            knot = KNOTS;
+        } else if jump.gate.clearance > 0.0 {
+            lead = stroke.time_at(free_from);
+            knot = KNOTS;
+        } else {
+            let Chamfer { pace, step, margin } = *chamfer.get_or_insert_with(|| {
+                let pace = pace(arm, &self.draft.path, free_from, down);
+                let until = travel.time_at((free_from / pace).min(1.0));
+                let step = until / f32::from(KNOTS);
+                let bend = stroke.peaks().0 + pace * travel.peaks().1;
+                Chamfer {
+                    pace,
+                    step,
+                    margin: 0.125 * bend * (step * step),
+                }
+            });
+            for _ in 0..KNOTS_A_STEP {
+                knot += 1;
+                let t = f32::from(knot) * step;
+                let own = (pace * travel.at(t).s).min(free_from);
+                // Beyond the middle the other end is nearer, and may be higher.
+                let other = if travel.at(t + step).s > 0.5 {
+                    free_from - beyond + beyond.min(0.5 * pace)
+                } else {
+                    0.0
+                };
+                let needed = (own.max(other) + margin).min(stroke.distance());
+                if stroke.at(lead + t).s < needed {
+                    lead = stroke.time_at(needed) - t;
+                }
+            }
+        }
+        self.stage = if knot < KNOTS {
+            Stage::Lead {
+                down,
+                knot,
+                chamfer,
+                lead,
+            }
+        } else if down {
+            jump.tail = lead;
+            Stage::Overlay
+        } else {
+            self.draft.start = lead;
+            Stage::Lead {
+                down: true,
+                knot: 0,
+                chamfer: None,
+                lead: 0.0,
+            }
+        };
+    }
+
+    /// Strokes and travel in time; whether another height is to be tried.
+    pub(super) fn overlay(&mut self) {
+        let (Some(jump), Some(lift)) = (&mut self.jump, &mut self.draft.lift) else {
+            return;
+        };
+        let wanted = self.draft.start + self.draft.profile.duration() + jump.tail;
+        let needed = lift.up.duration() + lift.down.duration();
+        self.draft.span = wanted.max(needed);
+        lift.down_start = self.draft.span - lift.down.duration();
+        let first = jump.round == 0;
+        jump.round += 1;
+        let fits = needed <= wanted;
+        if fits {
+            jump.fits = jump.raise;
+        } else {
+            jump.too_high = jump.raise;
+        }
+        let next = if jump.raise <= 0.0 || first && fits {
+            jump.raise
+        } else if jump.round <= BISECTIONS {
+            0.5 * (jump.fits + jump.too_high)
+        } else {
+            jump.fits
+        };
+        self.stage = if next == jump.raise || jump.round > BISECTIONS + 1 {
+            Stage::VERIFY
+        } else {
+            jump.raise = next;
+            Stage::Stroke { down: false }
+        };
+    }
+}
+
+/// A profile over a length that may be zero.
+fn stroke(length: f32, bounds: &Bounds) -> SCurve {
+    if length > NO_TRAVEL {
+        SCurve::new(length, bounds)
+    } else {
+        SCurve::default()
+    }
+}
+
+/// The greatest way of the tool across per unit of path, m, within the first `height` metres from one end of the path. Along a
+/// straight line in joint space it depends on the cosine of the elbow alone.
+fn pace(arm: &ArmModel, path: &Path, height: f32, from_end: bool) -> f32 {
+    let Path::Joint { start, delta } = path else {
+        return f32::MAX;
+    };
+    let arm1 = arm.geometry.a1 * delta.x;
+    let arm2 = arm.geometry.a2 * (delta.x + delta.y);
+    let at = |elbow: f32| {
+        let (_, cos) = sin_cos(elbow);
+        sqrt((arm1 * arm1 + arm2 * arm2 + 2.0 * arm1 * arm2 * cos).max(0.0))
+    };
+    let (first, step) = if from_end {
+        (start.y + delta.y, -delta.y)
+    } else {
+        (start.y, delta.y)
+    };
+    let here = at(first).max(NO_TRAVEL);
+    let share = height / here;
+    let last = first + step * if share < 0.5 { share } else { 1.0 };
+    if first * last <= 0.0 {
+        // Past the stretched arm, where it is greatest or least.
+        return (arm1.abs() + arm2.abs()).max(NO_TRAVEL);
+    }
+    here.max(at(last))
+}
