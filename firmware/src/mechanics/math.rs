@@ -88,6 +88,7 @@ pub fn sqrt(x: f32) -> f32 {
 /// is that of the last sum (1 u) plus a third of that of the cube (2 u). `libm` takes the same steps in `f64`, which is
 /// emulated in software on an M4F.
 #[must_use]
+#[inline(never)]
 pub fn cbrt(x: f32) -> f32 {
     let size = x.abs();
     if size < f32::MIN_POSITIVE {

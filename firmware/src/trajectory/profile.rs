@@ -82,6 +82,7 @@ impl Half {
     }
 
     /// Time at which the half, from rest, has come as far as `s`, at most its distance.
+    #[inline(never)]
     fn time_at(&self, s: f32) -> f32 {
         let Self {
             jerk,
@@ -173,6 +174,7 @@ impl SCurve {
     /// The fastest profile over `distance` (positive) within `bounds`.
     ///
     /// Worst case: four Newton steps, without a root.
+    #[inline(never)]
     pub fn new(distance: f32, bounds: &Bounds) -> Self {
         let Bounds {
             speed,
@@ -232,6 +234,7 @@ impl SCurve {
 
     /// First segment border after `t`, s; infinite from the end on. Jerk changes at a border, so the extrema of a move
     /// are often there.
+    #[inline(never)]
     pub fn border_after(&self, t: f32) -> f32 {
         let (cruise, brake) = (self.accelerate_end(), self.brake_start());
         if t < 0.0 {
@@ -289,6 +292,7 @@ impl SCurve {
     }
 
     /// First time at which the coordinate has reached `s`: 0 to the distance, which is not zero.
+    #[inline(never)]
     pub fn time_at(&self, s: f32) -> f32 {
         let left = self.distance - s;
         if s < self.accelerate.distance {

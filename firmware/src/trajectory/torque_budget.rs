@@ -15,9 +15,6 @@ use crate::mechanics::math::{cbrt, clamp, sqrt};
 /// exactly, and a saturated axis leaves the path.
 pub const TORQUE_SHARE: f32 = 0.93;
 
-/// Share of the torque that a stop may use: more than a plan, so that the plan's own peaks do not keep a stop from braking.
-const STOP_SHARE: f32 = 0.97;
-
 /// The limits of one arm with one payload, as the planner uses them.
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueBudget<'a> {
@@ -38,11 +35,11 @@ impl TorqueBudget<'_> {
             qdd: here.ddq * (along.v * along.v),
         };
         // Less than a hundredth of the limit: another sample decides.
-        self.room(&rest, &push, TORQUE_SHARE, 0.01)
+        self.room(&rest, &push, 0.01)
     }
 
     /// How fast the clock that runs through a trajectory at `time_scale` may be braked, 1/s, before the first torque reaches
-    /// what a stop may use. `reference` is the trajectory's own. With a load on the lift the two directions differ: its
+    /// its share. `reference` is the trajectory's own. With a load on the lift the two directions differ: its
     /// weight brakes a rise, and takes most of the force on the way down.
     pub fn braking_room(&self, reference: &Reference, time_scale: f32) -> f32 {
         let rest = Reference {
@@ -50,24 +47,24 @@ impl TorqueBudget<'_> {
             qd: reference.qd * time_scale,
             qdd: reference.qdd * (time_scale * time_scale),
         };
-        self.room(&rest, &-reference.qd, STOP_SHARE, 0.0).max(0.0)
+        self.room(&rest, &-reference.qd, 0.0).max(0.0)
     }
 
-    /// By what factor the accelerations `push` could grow before they and `rest` together need more than a `share` of the
-    /// torque of a joint or motor; those that need no more than a part `least` of it for `push` are left out.
+    /// By what factor the accelerations `push` could grow before they and `rest` together need more than their share of
+    /// the torque of a joint or motor; those that need no more than a part `least` of it for `push` are left out.
     // Out of line, for the size of two copies.
     #[inline(never)]
-    fn room(&self, rest: &Reference, push: &Vector4<f32>, share: f32, least: f32) -> f32 {
+    fn room(&self, rest: &Reference, push: &Vector4<f32>, least: f32) -> f32 {
         let Self { arm, body } = self;
         let Reference { q, qd, qdd } = rest;
-        let trig = Trig::in_line(q);
+        let trig = Trig::new(q);
         let push = body.inertial(&trig, push);
         let rest = body.inertial(&trig, qdd)
             + body.lagrange.bias(&trig, qd)
             + body.lagrange.gravity()
             + arm.drive.viscous.component_mul(qd)
             + body.drive.coulomb_friction(qd);
-        let (joint, motor) = self.torque_limits(share);
+        let (joint, motor) = self.torque_limits();
         let mut room = f32::MAX;
         let mut narrow = |push: f32, rest: f32, limit: f32| {
             let (need, rest) = if push < 0.0 {
@@ -92,7 +89,7 @@ impl TorqueBudget<'_> {
     /// [`RefusalReason::TorqueTooSmall`] with the axis and the torque, which no time scale reduces.
     pub fn check_creep(&self) -> Result<(), Refusal> {
         let torque = self.body.lagrange.gravity().abs() + self.arm.drive.coulomb;
-        let (joint, motor) = self.torque_limits(TORQUE_SHARE);
+        let (joint, motor) = self.torque_limits();
         let refuse = |axis: Axis, value: f32, limit: f32| {
             Err(Refusal {
                 reason: RefusalReason::TorqueTooSmall,
@@ -119,14 +116,14 @@ impl TorqueBudget<'_> {
     /// motors, of an arm that [can creep](Self::check_creep).
     pub fn torque_scale(&self, reference: &Reference) -> f32 {
         let Self { arm, body } = self;
-        let trig = Trig::in_line(&reference.q);
+        let trig = Trig::new(&reference.q);
         let (qd, qdd) = (&reference.qd, &reference.qdd);
         // tau(x) = a x² + b x + c. Coulomb friction does not depend on x.
         let a = body.inertial(&trig, qdd) + body.lagrange.bias(&trig, qd);
         let b = arm.drive.viscous.component_mul(qd);
         let c = body.lagrange.gravity() + body.drive.coulomb_friction(qd);
         let full = a + b + c;
-        let (joint, motor) = self.torque_limits(TORQUE_SHARE);
+        let (joint, motor) = self.torque_limits();
         // Nearly every sample keeps its limits as it is: then there is nothing to solve.
         if within(&full, &joint) && self.wrist_motor(&full).abs() <= motor {
             return 1.0;
@@ -139,13 +136,16 @@ impl TorqueBudget<'_> {
             .min(scale_within(wrist(&a), wrist(&b), wrist(&c), motor))
     }
 
-    /// A share of the torques: of the joints, as they and the motors that turn one joint each allow, and of the motor of the
+    /// Torques that a plan or a stop may use: of the joints, as they and the motors that turn one joint each allow, and of the motor of the
     /// wrist, which carries part of the lift's force, too.
-    fn torque_limits(&self, share: f32) -> (Vector4<f32>, f32) {
+    fn torque_limits(&self) -> (Vector4<f32>, f32) {
         let motor = self.arm.drive.motor_torque_limit;
         let mut own = self.body.drive.own_torque(&motor).abs();
         own.w = f32::MAX;
-        (self.arm.limits.effort.inf(&own) * share, motor.w * share)
+        (
+            self.arm.limits.effort.inf(&own) * TORQUE_SHARE,
+            motor.w * TORQUE_SHARE,
+        )
     }
 
     fn wrist_motor(&self, torque: &Vector4<f32>) -> f32 {
@@ -193,6 +193,7 @@ impl TorqueBudget<'_> {
 
     /// Bounds of the vertical strokes of a jump, up and down, over at most `height` m. Gravity and friction are
     /// subtracted from the available force; friction never adds to it.
+    #[inline(never)]
     pub fn lift(&self, height: f32) -> (Bounds, Bounds) {
         let limits = &self.arm.limits;
         let mass = self.body.mass_matrix(&Trig::new(&Vector4::zeros())).m33;

@@ -70,6 +70,7 @@ impl Jump {
     }
 
     /// Bounds of one stroke; of the descent with time running backwards, so that both ends are alike.
+    #[inline(never)]
     fn bounds(&self, budget: &TorqueBudget<'_>, down: bool) -> Bounds {
         let highest = self.gate.rise.max(self.gate.fall) + self.raise;
         let (up, descent) = budget.lift(highest);
@@ -258,6 +259,13 @@ fn stroke(length: f32, bounds: &Bounds) -> SCurve {
     }
 }
 
+/// The sum of two ways at the angle of the elbow.
+#[inline(never)]
+fn pace_at(arm1: f32, arm2: f32, elbow: f32) -> f32 {
+    let (_, cos) = sin_cos(elbow);
+    sqrt((arm1 * arm1 + arm2 * arm2 + 2.0 * arm1 * arm2 * cos).max(0.0))
+}
+
 /// The greatest way of the tool across per unit of path, m, within the first `height` metres from one end of the path. Along a
 /// straight line in joint space it depends on the cosine of the elbow alone.
 fn pace(arm: &ArmModel, path: &Path, height: f32, from_end: bool) -> f32 {
@@ -266,10 +274,7 @@ fn pace(arm: &ArmModel, path: &Path, height: f32, from_end: bool) -> f32 {
     };
     let arm1 = arm.geometry.a1 * delta.x;
     let arm2 = arm.geometry.a2 * (delta.x + delta.y);
-    let at = |elbow: f32| {
-        let (_, cos) = sin_cos(elbow);
-        sqrt((arm1 * arm1 + arm2 * arm2 + 2.0 * arm1 * arm2 * cos).max(0.0))
-    };
+    let at = |elbow: f32| pace_at(arm1, arm2, elbow);
     let (first, step) = if from_end {
         (start.y + delta.y, -delta.y)
     } else {
