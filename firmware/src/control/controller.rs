@@ -291,10 +291,10 @@ impl Controller {
             qd,
             torque: measured_torque,
             reference,
-            before_qd: before.qd,
             mean_qd: mean_velocity(&before, reference, readings.steps, period),
             qd_ahead: ahead.qd,
             qdd_ahead: ahead.qdd,
+            lead,
             period,
             excess: self.excess,
         };

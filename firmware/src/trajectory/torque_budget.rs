@@ -116,7 +116,7 @@ impl TorqueBudget<'_> {
     /// motors, of an arm that [can creep](Self::check_creep).
     pub fn torque_scale(&self, reference: &Reference) -> f32 {
         let Self { arm, body } = self;
-        let trig = Trig::new(&reference.q);
+        let trig = Trig::in_line(&reference.q);
         let (qd, qdd) = (&reference.qd, &reference.qdd);
         // tau(x) = a x² + b x + c. Coulomb friction does not depend on x.
         let a = body.inertial(&trig, qdd) + body.lagrange.bias(&trig, qd);

@@ -64,10 +64,10 @@ impl Controller {
             qd: qd.cast(),
             torque: Vector4::zeros(),
             reference: &reference,
-            before_qd: reference.qd,
             mean_qd: reference.qd,
             qd_ahead: reference.qd,
             qdd_ahead: reference.qdd,
+            lead: 0.0,
             period: 1e-3,
             excess: Vector4::zeros(),
         };

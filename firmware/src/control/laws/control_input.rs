@@ -39,12 +39,12 @@ pub struct Motion<'a> {
     pub reference: &'a Reference,
     /// Reference velocity through the same filter as `qd`, so that the two compare without a delay.
     pub mean_qd: Vector4<f32>,
-    /// Reference velocity one sample ago: at the middle of the time between two measured velocities.
-    pub before_qd: Vector4<f32>,
     /// Reference velocity at the middle of the time in which the command will act.
     pub qd_ahead: Vector4<f32>,
     /// Reference acceleration then.
     pub qdd_ahead: Vector4<f32>,
+    /// From the sampling instant to the middle of that time, s.
+    pub lead: f32,
     /// Sampling period, s.
     pub period: f32,
     /// What the limits cut off the efforts of the last sample; 0 where nothing was cut.
@@ -115,8 +115,6 @@ pub struct Model {
     /// Friction of the planned motion in the time in which the command will act: that of the measured one would chatter around
     /// rest.
     pub friction: Vector4<f32>,
-    /// Friction of the planned motion one sample ago.
-    pub friction_before: Vector4<f32>,
     /// C^T qd at the measured velocity: the rate of the momentum that no torque causes.
     pub kinetic_gradient: Vector4<f32>,
 }
@@ -129,7 +127,6 @@ impl Model {
             bias: body.lagrange.bias(trig, &motion.measured_qd_ahead()),
             gravity: body.lagrange.gravity(),
             friction: body.drive.friction(&motion.qd_ahead),
-            friction_before: body.drive.friction(&motion.before_qd),
             kinetic_gradient: body.lagrange.kinetic_gradient(trig, &motion.qd),
         }
     }

@@ -17,6 +17,8 @@ pub struct MomentumObserver {
     residual: Vector4<f32>,
     /// Mean torque of the sample before the last one.
     previous_torque: Vector4<f32>,
+    /// Friction that the laws counted with in the last sample, and in the one before.
+    friction: [Vector4<f32>; 2],
     started: bool,
 }
 
@@ -27,6 +29,7 @@ impl MomentumObserver {
             expected: Vector4::zeros(),
             residual: Vector4::zeros(),
             previous_torque: Vector4::zeros(),
+            friction: [Vector4::zeros(); 2],
             started: false,
         }
     }
@@ -51,7 +54,11 @@ impl MomentumObserver {
         // friction of the instant between them.
         let torque = 0.5 * (motion.torque + self.previous_torque);
         self.previous_torque = motion.torque;
-        let known = model.gravity + model.friction_before;
+        // Each was that of an instant ahead of its sample: the one between them is at the end of the last sample.
+        let [last, before] = self.friction;
+        self.friction = [model.friction, last];
+        let friction = last + (before - last) * (motion.lead / period).min(1.0);
+        let known = model.gravity + friction;
         self.expected += (torque + model.kinetic_gradient - known + self.residual) * period;
         let corner = corner.min(0.5 / period);
         self.residual = (momentum - self.expected) * corner;

@@ -25,7 +25,7 @@ const KNOTS: u8 = 9;
 const KNOTS_A_STEP: u8 = 3;
 /// Steps of planning at the most.
 pub(super) const STEPS: u32 = {
-    let round = 2 + 2 * (KNOTS / KNOTS_A_STEP) as u32 + 1;
+    let round = 2 + 2 * (1 + KNOTS / KNOTS_A_STEP) as u32 + 1;
     2 + (BISECTIONS as u32 + 2) * round
 };
 
@@ -161,7 +161,6 @@ impl Planner {
         };
         let (free_from, beyond) = (jump.free_from(down), jump.free_from(!down));
         let (mut knot, mut lead) = (knot, lead);
-        let mut chamfer = chamfer;
         if free_from <= NO_TRAVEL || travel.distance() <= 0.0 {
             // Nothing to wait for.
             knot = KNOTS;
@@ -169,27 +168,36 @@ impl Planner {
             lead = stroke.time_at(free_from);
             knot = KNOTS;
         } else {
-            let Chamfer { pace, step, margin } = *chamfer.get_or_insert_with(|| {
+            let Some(Chamfer { pace, step, margin }) = chamfer else {
                 let pace = pace(arm, &self.draft.path, free_from, down);
                 let until = travel.time_at((free_from / pace).min(1.0));
                 let step = until / f32::from(KNOTS);
                 let bend = stroke.peaks().0 + pace * travel.peaks().1;
-                Chamfer {
-                    pace,
-                    step,
-                    margin: 0.125 * bend * (step * step),
-                }
-            });
+                self.stage = Stage::Lead {
+                    down,
+                    knot,
+                    chamfer: Some(Chamfer {
+                        pace,
+                        step,
+                        margin: 0.125 * bend * (step * step),
+                    }),
+                    lead,
+                };
+                return;
+            };
+            let mut s = travel.at(f32::from(knot + 1) * step).s;
             for _ in 0..KNOTS_A_STEP {
                 knot += 1;
                 let t = f32::from(knot) * step;
-                let own = (pace * travel.at(t).s).min(free_from);
+                let next = travel.at(t + step).s;
+                let own = (pace * s).min(free_from);
                 // Beyond the middle the other end is nearer, and may be higher.
-                let other = if travel.at(t + step).s > 0.5 {
+                let other = if next > 0.5 {
                     free_from - beyond + beyond.min(0.5 * pace)
                 } else {
                     0.0
                 };
+                s = next;
                 let needed = (own.max(other) + margin).min(stroke.distance());
                 if stroke.at(lead + t).s < needed {
                     lead = stroke.time_at(needed) - t;
