@@ -139,8 +139,9 @@ impl Trajectory {
     /// # Errors
     /// A line that has not been surveyed by the planner may leave the reach; a planned one cannot.
     pub fn at(&self, arm: &ArmModel, t: f32) -> Result<Reference, PathError> {
-        self.evaluate(arm, t, None)
-            .map(|setpoint| setpoint.reference)
+        let mut setpoint = Setpoint::rest(Vector4::zeros());
+        self.evaluate(arm, t, None, &mut setpoint)?;
+        Ok(setpoint.reference)
     }
 
     /// As [`Trajectory::at`], and how the arm should move `lead` seconds later: at the place of that instant, but for the third
@@ -148,19 +149,31 @@ impl Trajectory {
     ///
     /// # Errors
     /// As [`Trajectory::at`].
-    pub fn follow(&self, arm: &ArmModel, t: f32, lead: f32) -> Result<Setpoint, PathError> {
-        self.evaluate(arm, t, Some(lead))
+    pub fn follow(
+        &self,
+        arm: &ArmModel,
+        t: f32,
+        lead: f32,
+        setpoint: &mut Setpoint,
+    ) -> Result<(), PathError> {
+        self.evaluate(arm, t, Some(lead), setpoint)
     }
 
-    /// With or without a look ahead, in one copy.
+    /// With or without a look ahead, in one copy. Into place: what is returned would be copied on the way.
     #[inline(never)]
-    fn evaluate(&self, arm: &ArmModel, t: f32, lead: Option<f32>) -> Result<Setpoint, PathError> {
+    fn evaluate(
+        &self,
+        arm: &ArmModel,
+        t: f32,
+        lead: Option<f32>,
+        setpoint: &mut Setpoint,
+    ) -> Result<(), PathError> {
         let scale = self.time_scale;
         let later = lead.map(|lead| (t + lead) * scale);
         let t = t * scale;
         let now = self.profile.at(t - self.start);
         let then = later.map_or(now, |later| self.profile.at(later - self.start));
-        let mut setpoint = match &self.path {
+        *setpoint = match &self.path {
             // As below, without what is zero: nearly every move is one of these.
             Path::Joint { start, delta } => Setpoint {
                 reference: Reference {
@@ -189,7 +202,7 @@ impl Trajectory {
                 }
             }
         };
-        let Setpoint { reference, ahead } = &mut setpoint;
+        let Setpoint { reference, ahead } = setpoint;
         if let Some(lift) = &self.lift {
             let now = lift.at(t);
             let then = later.map_or(now, |later| lift.at(later));
@@ -202,6 +215,6 @@ impl Trajectory {
         reference.qdd *= squared;
         ahead.qd *= scale;
         ahead.qdd *= squared;
-        Ok(setpoint)
+        Ok(())
     }
 }

@@ -112,8 +112,8 @@ pub struct Controller {
     fault: Fault,
     /// A fault not reported to the peers yet.
     alarm: Option<Fault>,
-    /// The reference of the last sample, as handed to the law.
-    reference: Reference,
+    /// What the last sample followed, as handed to the law.
+    setpoint: Setpoint,
     memory: Memory,
     monitor: Monitor,
     excess: Vector4<f32>,
@@ -147,7 +147,7 @@ impl Controller {
             fault: Fault::NONE,
             alarm: None,
             queue: MoveQueue::new(),
-            reference: Reference::rest(Vector4::zeros()),
+            setpoint: Setpoint::rest(Vector4::zeros()),
             memory: Memory::new(),
             monitor: Monitor::new(&config.arm, &config.setup.monitor),
             excess: Vector4::zeros(),
@@ -199,7 +199,7 @@ impl Controller {
 
     /// Reference of the last sample.
     pub fn reference(&self) -> &Reference {
-        &self.reference
+        &self.setpoint.reference
     }
 
     /// Reference minus measured position of the last sample.
@@ -272,7 +272,7 @@ impl Controller {
         self.wait(readings.steps);
         if !self.state.is_powered() {
             // No torque: follow the arm, so that enabling starts at its present position.
-            self.reference = Reference::rest(q);
+            self.setpoint = Setpoint::rest(q);
             self.queue.clear(&q);
             self.error = Vector4::zeros();
             self.excess = Vector4::zeros();
@@ -280,10 +280,9 @@ impl Controller {
         }
         let period = self.config.period.seconds();
         let lead = self.setup.command_delay + 0.5 * period;
-        let before = self.reference;
-        let Setpoint { reference, ahead } = self.advance(readings.steps.min(self.max_gap), lead);
-        self.reference = reference;
-        let reference = &self.reference;
+        let before = self.setpoint.reference;
+        self.advance(readings.steps.min(self.max_gap), lead);
+        let Setpoint { reference, ahead } = &self.setpoint;
         self.error = reference.q - q;
 
         let motion = Motion {

@@ -104,6 +104,8 @@ impl Path {
 ///
 /// # Errors
 /// [`IkError::Limit`] with the axis, the value and the limit passed.
+// Out of line: asked for in several places.
+#[inline(never)]
 pub fn check_limits(
     arm: &ArmModel,
     q: &Vector4<f32>,

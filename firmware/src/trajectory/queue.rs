@@ -139,58 +139,58 @@ impl MoveQueue {
         ))
     }
 
-    /// What to follow next. Without a move the arm stays at `here`.
+    /// What to follow next, in place of what was followed last. Without a move the arm stays there.
     pub fn advance(
         &mut self,
         budget: &TorqueBudget<'_>,
         pace: &Pace,
-        here: &Vector4<f32>,
-    ) -> (Setpoint, Progress) {
+        setpoint: &mut Setpoint,
+    ) -> Progress {
         let Pace {
             steps,
             period,
             lead,
             stopping,
         } = *pace;
+        let here = setpoint.reference.q;
         let Some(trajectory) = self.moves.front() else {
-            return (Setpoint::rest(*here), Progress::Arrived);
+            *setpoint = Setpoint::rest(here);
+            return Progress::Arrived;
         };
         for _ in 0..steps {
             self.clock.advance(period);
         }
         let t = self.clock.time(period);
         let ended = t >= trajectory.duration();
-        // A verified path stays in reach; should arithmetic disagree, the arm holds.
-        let Ok(planned) = trajectory.follow(budget.arm, t, self.clock.lead(lead)) else {
-            return (Setpoint::rest(*here), Progress::UnderWay);
-        };
+        let ahead = self.clock.lead(lead);
+        if trajectory.follow(budget.arm, t, ahead, setpoint).is_err() {
+            // A verified path stays in reach; should arithmetic disagree, the arm holds.
+            *setpoint = Setpoint::rest(here);
+        }
         if stopping {
-            let Setpoint { reference, ahead } = planned;
-            let room = budget.braking_room(&reference, self.clock.time_scale());
+            let Reference { q, qd, qdd } = setpoint.reference;
+            let room = budget.braking_room(&setpoint.reference, self.clock.time_scale());
             let limits = &budget.arm.limits;
-            self.clock.brake(&reference, room, limits, period);
+            self.clock.brake(&setpoint.reference, room, limits, period);
             if ended || self.clock.is_stopped() {
-                return (Setpoint::rest(reference.q), Progress::Arrived);
+                *setpoint = Setpoint::rest(q);
+                return Progress::Arrived;
             }
-            let Reference { q, qd, qdd } = reference;
             let Rates { qd, qdd } = self.clock.apply(&Rates { qd, qdd }, 0.0);
-            let setpoint = Setpoint {
-                reference: Reference { q, qd, qdd },
-                ahead: self.clock.apply(&ahead, lead),
-            };
-            return (setpoint, Progress::UnderWay);
+            setpoint.reference = Reference { q, qd, qdd };
+            setpoint.ahead = self.clock.apply(&setpoint.ahead, lead);
+            return Progress::UnderWay;
         }
         if ended {
             self.completed = trajectory.sequence;
             self.moves.pop_front();
             self.clock = Clock::default();
         }
-        let progress = if self.moves.is_empty() {
+        if self.moves.is_empty() {
             Progress::Arrived
         } else {
             Progress::UnderWay
-        };
-        (planned, progress)
+        }
     }
 }
 

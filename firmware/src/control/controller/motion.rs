@@ -44,10 +44,11 @@ impl Controller {
     }
 
     /// What to follow at this sample.
-    pub(super) fn advance(&mut self, steps: u32, lead: f32) -> Setpoint {
+    pub(super) fn advance(&mut self, steps: u32, lead: f32) {
         if self.state == State::Enabled {
             if !self.queue.is_ready() {
-                return Setpoint::rest(self.reference.q);
+                self.setpoint = Setpoint::rest(self.setpoint.reference.q);
+                return;
             }
             self.event(Event::Start);
         }
@@ -62,17 +63,15 @@ impl Controller {
             lead,
             stopping,
         };
-        let (setpoint, progress) = self.queue.advance(&budget, &pace, &self.reference.q);
-        match progress {
+        match self.queue.advance(&budget, &pace, &mut self.setpoint) {
             Progress::UnderWay => {}
             Progress::Arrived if stopping => {
-                self.queue.clear(&setpoint.reference.q);
+                self.queue.clear(&self.setpoint.reference.q);
                 self.event(Event::AtRest);
             }
             Progress::Arrived => {
                 self.event(Event::Arrived);
             }
         }
-        setpoint
     }
 }

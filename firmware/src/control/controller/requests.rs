@@ -37,7 +37,7 @@ impl Controller {
                 self.withdraw();
                 if self.state == State::Enabled {
                     // Planned but not started: there is nothing to brake.
-                    self.queue.clear(&self.reference.q);
+                    self.queue.clear(&self.setpoint.reference.q);
                 }
                 self.event(Event::Stop);
                 Answer::Now

@@ -50,7 +50,7 @@ impl Controller {
                 // A violation has to recur before it escalates.
                 self.monitor.reset();
                 if halt == Halt::Off {
-                    self.queue.clear(&self.reference.q);
+                    self.queue.clear(&self.setpoint.reference.q);
                 }
             }
             State::PreOperational => self.fault = Fault::NONE,
@@ -78,9 +78,9 @@ impl Controller {
         if let Some(fault) = Monitor::status(status) {
             self.fail(fault);
         }
-        let error = self.reference.q - q;
+        let error = self.setpoint.reference.q - q;
         // The reference of the last sample: at most one sample of motion older than `q`.
-        let moved = self.reference.qd * self.config.period.seconds();
+        let moved = self.setpoint.reference.qd * self.config.period.seconds();
         if let Some(fault) = self.monitor.check(q, qd, &(error + moved)) {
             self.fail(fault);
         }

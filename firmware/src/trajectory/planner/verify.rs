@@ -82,8 +82,11 @@ impl Planner {
         let mut next = (t + step).min(*span);
         next = next.min(start + profile.border_after(soon - start));
         if let Some(lift) = lift {
-            next = next.min(lift.up.border_after(soon));
-            next = next.min(lift.down_start + lift.down.border_after(soon - lift.down_start));
+            next = next.min(if soon < lift.down_start {
+                lift.up.border_after(soon).min(lift.down_start)
+            } else {
+                lift.down_start + lift.down.border_after(soon - lift.down_start)
+            });
         }
         next
     }
