@@ -173,48 +173,36 @@ impl Trajectory {
         let t = t * scale;
         let now = self.profile.at(t - self.start);
         let then = later.map_or(now, |later| self.profile.at(later - self.start));
-        *setpoint = match &self.path {
+        let Setpoint { reference, ahead } = setpoint;
+        let squared = scale * scale;
+        match &self.path {
             // As below, without what is zero: nearly every move is one of these.
-            Path::Joint { start, delta } => Setpoint {
-                reference: Reference {
-                    q: start + delta * now.s,
-                    qd: delta * now.v,
-                    qdd: delta * now.a,
-                },
-                ahead: Rates {
-                    qd: delta * then.v,
-                    qdd: delta * then.a,
-                },
-            },
+            Path::Joint { start, delta } => {
+                reference.q = start + delta * now.s;
+                reference.qd = delta * (now.v * scale);
+                reference.qdd = delta * (now.a * squared);
+                if lead.is_some() {
+                    ahead.qd = delta * (then.v * scale);
+                    ahead.qdd = delta * (then.a * squared);
+                }
+            }
             path @ Path::Line { .. } => {
                 let PathPoint { q, dq, ddq } = path.at(arm, now.s)?;
                 let dq_then = dq + ddq * (then.s - now.s);
-                Setpoint {
-                    reference: Reference {
-                        q,
-                        qd: dq * now.v,
-                        qdd: dq * now.a + ddq * (now.v * now.v),
-                    },
-                    ahead: Rates {
-                        qd: dq_then * then.v,
-                        qdd: dq_then * then.a + ddq * (then.v * then.v),
-                    },
-                }
+                reference.q = q;
+                reference.qd = dq * (now.v * scale);
+                reference.qdd = (dq * now.a + ddq * (now.v * now.v)) * squared;
+                ahead.qd = dq_then * (then.v * scale);
+                ahead.qdd = (dq_then * then.a + ddq * (then.v * then.v)) * squared;
             }
-        };
-        let Setpoint { reference, ahead } = setpoint;
+        }
         if let Some(lift) = &self.lift {
             let now = lift.at(t);
             let then = later.map_or(now, |later| lift.at(later));
             reference.q.z = now.s;
-            (reference.qd.z, reference.qdd.z) = (now.v, now.a);
-            (ahead.qd.z, ahead.qdd.z) = (then.v, then.a);
+            (reference.qd.z, reference.qdd.z) = (now.v * scale, now.a * squared);
+            (ahead.qd.z, ahead.qdd.z) = (then.v * scale, then.a * squared);
         }
-        let squared = scale * scale;
-        reference.qd *= scale;
-        reference.qdd *= squared;
-        ahead.qd *= scale;
-        ahead.qdd *= squared;
         Ok(())
     }
 }

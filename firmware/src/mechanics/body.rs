@@ -17,6 +17,8 @@ pub struct Body {
     pub lagrange: Lagrange,
     /// Motors, gears, coupling and friction.
     pub drive: Drive,
+    /// Greatest efforts: of the joints, as they and the motors that turn one joint each allow.
+    pub effort_limit: Vector4<f32>,
     /// Rotor inertia seen at the joints, A^T Jm A.
     rotor: Matrix4<f32>,
     /// Inertia of each axis by itself with the elbow at a right angle, for laws without a model.
@@ -27,9 +29,12 @@ impl Body {
     /// The arm carrying `payload`.
     pub fn new(arm: &ArmModel, payload: &Payload) -> Self {
         let drive = Drive::new(&arm.drive);
+        let mut motors = drive.own_torque(&arm.drive.motor_torque_limit).abs();
+        motors.w = f32::MAX;
         let mut body = Self {
             lagrange: Lagrange::new(arm, payload),
             drive,
+            effort_limit: arm.limits.effort.inf(&motors),
             rotor: drive.rotor_inertia(),
             nominal_inertia: Vector4::zeros(),
         };

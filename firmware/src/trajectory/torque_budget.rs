@@ -139,13 +139,8 @@ impl TorqueBudget<'_> {
     /// Torques that a plan or a stop may use: of the joints, as they and the motors that turn one joint each allow, and of the motor of the
     /// wrist, which carries part of the lift's force, too.
     fn torque_limits(&self) -> (Vector4<f32>, f32) {
-        let motor = self.arm.drive.motor_torque_limit;
-        let mut own = self.body.drive.own_torque(&motor).abs();
-        own.w = f32::MAX;
-        (
-            self.arm.limits.effort.inf(&own) * TORQUE_SHARE,
-            motor.w * TORQUE_SHARE,
-        )
+        let motor = self.arm.drive.motor_torque_limit.w;
+        (self.body.effort_limit * TORQUE_SHARE, motor * TORQUE_SHARE)
     }
 
     fn wrist_motor(&self, torque: &Vector4<f32>) -> f32 {
