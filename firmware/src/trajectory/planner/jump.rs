@@ -21,8 +21,8 @@ use crate::trajectory::torque_budget::TorqueBudget;
 /// Bisections of the height by which the top is raised.
 const BISECTIONS: u8 = 3;
 /// Instants at which stroke and travel are compared at each end, and how many in one step.
-const KNOTS: u8 = 9;
-const KNOTS_A_STEP: u8 = 3;
+const KNOTS: u8 = 8;
+const KNOTS_A_STEP: u8 = 2;
 /// Steps of planning at the most.
 pub(super) const STEPS: u32 = {
     let round = 2 + 2 * (1 + KNOTS / KNOTS_A_STEP) as u32 + 1;
