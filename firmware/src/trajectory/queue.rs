@@ -169,7 +169,13 @@ impl MoveQueue {
         }
         if stopping {
             let Reference { q, qd, qdd } = setpoint.reference;
-            let room = budget.braking_room(&setpoint.reference, self.clock.time_scale());
+            // The torque is that of the instant in which the command acts.
+            let then = Reference {
+                q,
+                qd: setpoint.ahead.qd,
+                qdd: setpoint.ahead.qdd,
+            };
+            let room = budget.braking_room(&then, self.clock.time_scale());
             let limits = &budget.arm.limits;
             self.clock.brake(&setpoint.reference, room, limits, period);
             if ended || self.clock.is_stopped() {

@@ -108,7 +108,7 @@ fn line(arm: &ArmModel, from: &Vector4<f32>, to: &Pose) -> Result<Path, Refusal>
     })
 }
 
-/// Heights of a jump; the top must lie above both ends and inside the stroke.
+/// Heights of a jump; the top must lie above the end and inside the stroke.
 fn gate(
     arm: &ArmModel,
     from: &Vector4<f32>,
@@ -124,15 +124,17 @@ fn gate(
     let mut highest = *to;
     highest.z = d3_top;
     check_limits(arm, &highest, None).map_err(from_ik)?;
-    let rise = zero_if_tiny(from.z - d3_top);
     let fall = zero_if_tiny(to.z - d3_top);
-    if rise < 0.0 || fall < 0.0 || clearance < 0.0 {
+    if fall < 0.0 || clearance < 0.0 {
         return Err(Refusal::value(
             RefusalReason::OutOfRange,
-            rise.min(fall).min(clearance),
+            fall.min(clearance),
             0.0,
         ));
     }
+    // The top is the least height: where a stop has left the arm higher, it goes across there.
+    let d3_top = d3_top.min(from.z);
+    let (rise, fall) = (zero_if_tiny(from.z - d3_top), to.z - d3_top);
     Ok(Gate {
         rise,
         fall,
