@@ -57,7 +57,7 @@ impl TorqueBudget<'_> {
     fn room(&self, rest: &Reference, push: &Vector4<f32>, least: f32) -> f32 {
         let Self { arm, body } = self;
         let Reference { q, qd, qdd } = rest;
-        let trig = Trig::new(q);
+        let trig = Trig::in_line(q);
         let push = body.inertial(&trig, push);
         let rest = body.inertial(&trig, qdd)
             + body.lagrange.bias(&trig, qd)

@@ -244,7 +244,7 @@ impl Stage {
     fn sample(&mut self) -> Result<(), OperatorError> {
         let reference = self.controller.reference();
         let t = self.period;
-        let ahead = reference.qd + reference.qdd * (t / 2.0) + reference.qddd * (t * t / 6.0);
+        let ahead = reference.qd + reference.qdd * (t / 2.0);
         let q = reference.q + ahead * t;
         self.sample_at(q);
         let fault = self.controller.fault();
