@@ -49,7 +49,8 @@ fn joints(to: [f64; 4]) -> Step {
     Step::Joints(Line { to, speed: 1.0 })
 }
 
-/// Runs without a fault; the error of the tool stays below `limit_mm` and no motor saturates.
+/// Runs without a fault; the error of the tool stays below `limit_mm`, and no motor is at its limit for longer than the
+/// few samples in which a stop begins.
 fn runs(scenario: Scenario, limit_mm: f64, what: &str) -> Summary {
     let summary = in_process(&RunConfig::new(scenario), &mut ()).unwrap();
     assert_eq!(summary.error, None, "{what}");
@@ -58,7 +59,7 @@ fn runs(scenario: Scenario, limit_mm: f64, what: &str) -> Summary {
     assert!(error < limit_mm, "{what}: {error} mm");
     let saturated = summary.longest_saturation_s;
     assert!(
-        saturated.iter().all(|s| *s <= 0.002),
+        saturated.iter().all(|s| *s <= 0.006),
         "{what}: {saturated:?}"
     );
     summary
@@ -105,14 +106,14 @@ fn a_stop_on_the_way_up_or_down_stays_on_the_path() {
             let cycle = vec![jump(low, -0.1214), Step::Stop(after), Step::Dwell(0.2)];
             runs(
                 scenario(low, kg, cycle),
-                0.3,
+                0.1,
                 &format!("{kg} kg, {after} s"),
             );
             let to = [0.706, -0.106, -0.41, 1.0];
             let cycle = vec![jump(to, -0.14), Step::Stop(after), Step::Dwell(0.2)];
             runs(
                 scenario(low, kg, cycle),
-                0.3,
+                0.1,
                 &format!("{kg} kg, across, {after} s"),
             );
         }

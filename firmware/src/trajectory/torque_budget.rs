@@ -191,7 +191,7 @@ impl TorqueBudget<'_> {
     #[inline(never)]
     pub fn lift(&self, height: f32) -> (Bounds, Bounds) {
         let limits = &self.arm.limits;
-        let mass = self.body.mass_matrix(&Trig::new(&Vector4::zeros())).m33;
+        let mass = self.body.nominal_inertia.z;
         let weight = -self.body.lagrange.gravity().z;
         let cap = limits.acceleration.z;
         let speed = self.speed().z;
