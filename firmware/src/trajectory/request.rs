@@ -4,7 +4,7 @@ use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
 use super::path::{MIN_SIN_ELBOW, Path, PathError, check_limits};
-use crate::mechanics::arm::ArmModel;
+use crate::mechanics::arm::{ArmModel, Axis};
 use crate::mechanics::kinematics::{self, Elbow, IkError, Pose};
 use crate::mechanics::math::wrap;
 
@@ -121,9 +121,14 @@ fn gate(
     }
     let d3_top = zero_if_tiny(arm.geometry.d1 - arm.geometry.d4 - top - arm.limits.lower.z)
         + arm.limits.lower.z;
-    let mut highest = *to;
-    highest.z = d3_top;
-    check_limits(arm, &highest, None).map_err(from_ik)?;
+    let (lower, upper) = (arm.limits.lower.z, arm.limits.upper.z);
+    if d3_top < lower || d3_top > upper {
+        return Err(from_ik(IkError::Limit {
+            axis: Axis::Lift,
+            value: d3_top,
+            limit: if d3_top < lower { lower } else { upper },
+        }));
+    }
     let fall = zero_if_tiny(to.z - d3_top);
     if fall < 0.0 || clearance < 0.0 {
         return Err(Refusal::value(
