@@ -119,10 +119,9 @@ fn gate(
     if !(top.is_finite() && clearance.is_finite()) {
         return Err(Refusal::because(RefusalReason::NotFinite));
     }
-    let d3_top = zero_if_tiny(arm.geometry.d1 - arm.geometry.d4 - top - arm.limits.lower.z)
-        + arm.limits.lower.z;
+    let d3_top = arm.geometry.d1 - arm.geometry.d4 - top;
     let (lower, upper) = (arm.limits.lower.z, arm.limits.upper.z);
-    if d3_top < lower || d3_top > upper {
+    if d3_top < lower - NO_HEIGHT || d3_top > upper {
         return Err(from_ik(IkError::Limit {
             axis: Axis::Lift,
             value: d3_top,
@@ -138,7 +137,7 @@ fn gate(
         ));
     }
     // The top is the least height: where a stop has left the arm higher, it goes across there.
-    let d3_top = d3_top.min(from.z);
+    let d3_top = d3_top.max(lower).min(from.z);
     let (rise, fall) = (zero_if_tiny(from.z - d3_top), to.z - d3_top);
     Ok(Gate {
         rise,
