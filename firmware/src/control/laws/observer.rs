@@ -57,10 +57,12 @@ impl MomentumObserver {
         // Each was that of an instant ahead of its sample: the one between them is at the end of the last sample.
         let [last, before] = self.friction;
         self.friction = [model.friction, last];
-        let friction = last + (before - last) * (motion.lead / period).min(1.0);
+        let share = motion.lead / period;
+        let friction = last + (before - last) * if share < 1.0 { share } else { 1.0 };
         let known = model.gravity + friction;
         self.expected += (torque + model.kinetic_gradient - known + self.residual) * period;
-        let corner = corner.min(0.5 / period);
+        let greatest = 0.5 / period;
+        let corner = if corner < greatest { corner } else { greatest };
         self.residual = (momentum - self.expected) * corner;
         self.residual
     }
