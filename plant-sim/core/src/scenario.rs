@@ -20,22 +20,19 @@ pub use error::{Place, ScenarioError};
 
 pub use crate::text::Source;
 
+macro_rules! built_in {
+    ($($name:literal),+) => {
+        [$(($name, include_str!(concat!("../../scenarios/", $name, ".toml")))),+]
+    };
+}
+
 /// Scenarios that come with the program: name and text.
-const BUILT_IN: [(&str, &str); 5] = [
-    ("gate", include_str!("../../scenarios/gate.toml")),
-    (
-        "gate-mismatch",
-        include_str!("../../scenarios/gate-mismatch.toml"),
-    ),
-    (
-        "gate-vertical",
-        include_str!("../../scenarios/gate-vertical.toml"),
-    ),
-    ("square", include_str!("../../scenarios/square.toml")),
-    (
-        "pick-place",
-        include_str!("../../scenarios/pick-place.toml"),
-    ),
+const BUILT_IN: [(&str, &str); 5] = built_in![
+    "gate",
+    "gate-mismatch",
+    "gate-vertical",
+    "square",
+    "pick-place"
 ];
 
 /// What to run. Lengths in m in frame 0, angles in rad. An unknown key is refused.

@@ -1,0 +1,128 @@
+//! Profiles against integration, bounds and the textbook.
+
+use super::*;
+use proptest::prelude::*;
+
+proptest! {
+    /// The three derivatives, integrated in f64, reproduce the distance; no bound is exceeded.
+    #[test]
+    fn integrates_to_the_distance_within_bounds(
+        distance in 0.01f32..6.0,
+        speed in 0.05f32..30.0,
+        accelerate in 0.5f32..600.0,
+        ratio in 0.2f32..5.0,
+        jerk in 50.0f32..40_000.0,
+    ) {
+        let bounds = Bounds { speed, accelerate, brake: accelerate * ratio, jerk };
+        let curve = SCurve::new(distance, &bounds);
+        let duration = curve.duration();
+        let steps = 4000;
+        let h = f64::from(duration) / f64::from(steps);
+        let mut s = 0.0f64;
+        let mut before = 0.0;
+        for i in 0..steps {
+            let sample = curve.at(((f64::from(i) + 0.5) * h) as f32);
+            s += f64::from(sample.v) * h;
+            prop_assert!(sample.v >= -1e-5 && sample.v <= speed * 1.00001);
+            prop_assert!(sample.a <= accelerate * 1.00001);
+            prop_assert!(-sample.a <= accelerate * ratio * 1.00001);
+            // Accelerations of f32, each off by 4 u.
+            // And of f32 times.
+            let noise = 8.0 * f32::EPSILON * accelerate * ratio.max(1.0)
+                + 2.0 * f32::EPSILON * duration * jerk;
+            prop_assert!((sample.a - before).abs() <= jerk * (h as f32) * 1.0001 + noise);
+            before = sample.a;
+        }
+        // Midpoint rule: error below h^2/24 * T * max|a'| = jerk; plus f32 in the evaluation.
+        let rule = h * h * f64::from(duration * jerk) / 24.0;
+        prop_assert!((s - f64::from(distance)).abs() < rule + 4e-6 * f64::from(distance), "{s} {distance}");
+        prop_assert_eq!(curve.at(duration).s, distance);
+        prop_assert_eq!(curve.at(-1.0), Sample::default());
+    }
+
+    /// Position is continuous across the segment borders: no jump larger than speed x step.
+    #[test]
+    fn is_continuous(
+        distance in 0.01f32..6.0,
+        accelerate in 0.5f32..600.0,
+        jerk in 50.0f32..40_000.0,
+    ) {
+        let bounds = Bounds { speed: 1e3, accelerate, brake: accelerate, jerk };
+        let curve = SCurve::new(distance, &bounds);
+        let h = curve.duration() / 1000.0;
+        for i in 0..1000 {
+            let (before, after) = (curve.at(i as f32 * h), curve.at((i + 1) as f32 * h));
+            let slack = 4e-6 * distance;
+            prop_assert!((after.s - before.s - 0.5 * (before.v + after.v) * h).abs()
+                <= slack + jerk * h * h * h);
+        }
+    }
+}
+
+/// The jerk is constant between borders and changes at each. All eight are found, and no other.
+#[test]
+fn borders_are_where_the_jerk_changes() {
+    let bounds = Bounds {
+        speed: 2.0,
+        accelerate: 20.0,
+        brake: 30.0,
+        jerk: 1e3,
+    };
+    let curve = SCurve::new(1.0, &bounds);
+    let mut t = -0.1;
+    let borders = [(); 8].map(|()| {
+        let border = curve.border_after(t);
+        t = border + 1e-6;
+        border
+    });
+    assert_eq!(curve.border_after(t), f32::INFINITY);
+    assert_eq!(borders[0], 0.0);
+    assert!((borders[7] / curve.duration() - 1.0).abs() < 1e-6);
+    for (segment, jerk) in borders
+        .windows(2)
+        .zip([1e3, 0.0, -1e3, 0.0, -1e3, 0.0, 1e3])
+    {
+        let length = segment[1] - segment[0];
+        for share in [0.01, 0.4, 0.7] {
+            let t = segment[0] + share * length;
+            let change = curve.at(t + 0.29 * length).a - curve.at(t).a;
+            // Time and acceleration off by 4 u each, over 0.29 of some 10 ms.
+            let slope = change / (0.29 * length);
+            assert!((slope - jerk).abs() < 1.0, "{slope} {jerk} {borders:?}");
+        }
+    }
+}
+
+#[test]
+fn symmetric_triangle_has_the_textbook_duration() {
+    // Without a speed limit and with jerk only: T = (32 s / j)^(1/3).
+    let curve = SCurve::new(
+        1.0,
+        &Bounds {
+            speed: 1e3,
+            accelerate: 1e6,
+            brake: 1e6,
+            jerk: 500.0,
+        },
+    );
+    let expected = libm::cbrtf(32.0 / 500.0);
+    assert!((curve.duration() / expected - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn time_at_inverts_the_profile() {
+    let curve = SCurve::new(
+        0.025,
+        &Bounds {
+            speed: 2.2,
+            accelerate: 55.0,
+            brake: 40.0,
+            jerk: 1e4,
+        },
+    );
+    for i in 1..10 {
+        let s = 0.0025 * i as f32;
+        // At the peak speed of 1 m/s, 2^-14 of 50 ms.
+        assert!((curve.at(curve.time_at(s)).s - s).abs() < 4e-6);
+    }
+}
