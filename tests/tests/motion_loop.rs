@@ -1,5 +1,11 @@
 //! Moves, stops and starts in the whole loop, over places, loads and times; judged by the truth.
 
+#![allow(
+    clippy::expect_used,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
 use std::io;
 
 use sim::observer::{Observer, Truth};
@@ -28,7 +34,7 @@ impl Observer for Corners {
 }
 
 fn scenario(start: [f64; 4], kg: f64, cycle: Vec<Step>) -> Scenario {
-    let mut scenario = Scenario::built_in("gate").unwrap();
+    let mut scenario = Scenario::built_in("gate").expect("it comes with the program");
     scenario.cycles = 1;
     scenario.start = start;
     scenario.payload = Some(PayloadSpec::compact(kg));
@@ -52,7 +58,7 @@ fn joints(to: [f64; 4]) -> Step {
 /// Runs without a fault; the error of the tool stays below `limit_mm`, and no motor is at its limit for longer than the
 /// few samples in which a stop begins.
 fn runs(scenario: Scenario, limit_mm: f64, what: &str) -> Summary {
-    let summary = in_process(&RunConfig::new(scenario), &mut ()).unwrap();
+    let summary = in_process(&RunConfig::new(scenario), &mut ()).expect("a run can begin");
     assert_eq!(summary.error, None, "{what}");
     assert!(summary.faults.is_empty(), "{what}: {:?}", summary.faults);
     let error = summary.tracking_error_mm.max;
