@@ -110,7 +110,7 @@ need_browser() { # sets $peers and exports PEERS, CHROMIUM: where tests/pages fi
     peers=$target/pages
     mkdir -p "$peers"
     npm install --prefix "$peers" --no-save --no-package-lock --no-audit --no-fund --silent \
-        playwright-core@1.65.1 axe-core@4.14.1 uplot@1.6.32 2>"$work/npm.err"
+        playwright-core@1.56.1 axe-core@4.14.1 uplot@1.6.32 2>"$work/npm.err"
     CHROMIUM=$(type -P chromium)
     export PEERS=$peers CHROMIUM
 }

@@ -23,6 +23,9 @@ const BISECTIONS: u8 = 3;
 /// Instants at which stroke and travel are compared at each end, and how many in one step.
 const KNOTS: u8 = 8;
 const KNOTS_A_STEP: u8 = 2;
+/// Share of the travel from which on the other end may be the nearer one. The tool follows an arc at a varying pace, so that
+/// it need not be half way when the travel is.
+const OTHER_END: f32 = 0.3;
 /// Steps of planning at the most.
 pub(super) const STEPS: u32 = {
     let round = 2 + 2 * (1 + KNOTS / KNOTS_A_STEP) as u32 + 1;
@@ -191,8 +194,8 @@ impl Planner {
                 let t = f32::from(knot) * step;
                 let next = travel.at(t + step).s;
                 let own = (pace * s).min(free_from);
-                // Beyond the middle the other end is nearer, and may be higher.
-                let other = if next > 0.5 {
+                // Beyond its middle the other end is nearer, and may be higher.
+                let other = if next > OTHER_END {
                     free_from - beyond + beyond.min(0.5 * pace)
                 } else {
                     0.0
