@@ -31,8 +31,8 @@ function middle({ data, width }, [red, green, blue]) {
     return { count, x: x / count, y: y / count };
 }
 
-// The slider has a step of a millisecond, and the table one more digit of rounding.
-const seek = (page, t) => page.getByLabel("Time", { exact: true }).fill(t.toFixed(3));
+// The slider takes whole milliseconds in their shortest form alone; a time of the table has a digit of rounding.
+const seek = (page, t) => page.getByLabel("Time", { exact: true }).fill(String(Number(t.toFixed(3))));
 
 /** The arm is where the truth has it: the middle of what is drawn of it moves as the middle of the links does. */
 async function armFollowsTheTruth(page) {
