@@ -6,12 +6,6 @@ const LAWS = [
     "pid", "pd-gravity", "kinematic-joint", "kinematic-task",
 ];
 
-/** Faults to choose from, each in the words of docs/faults.md; the gate is in motion at 0.4 s. */
-const FAULTS = [
-    "none", "command:loss=0.2@0.3s..0.5s", "feedback:loss@0.4s", "feedback:corrupt@0.4s", "drives:silent@0.4s",
-    "encoder:elbow:stuck@0.4s", "encoder:shoulder:jump=0.01@0.4s", "motor:elbow:weak=0.5@0.4s", "motor:lift:dead@0.4s", "payload:dropped@0.4s",
-];
-
 /** All that can be set: name in the link, label, range and step or choices, value at the start, unit. */
 const SETTINGS = [
     { key: "law", label: "Control law", choices: LAWS, start: LAWS[0] },
@@ -22,7 +16,6 @@ const SETTINGS = [
     { key: "observer", label: "Observer or integral", from: 5, to: 250, step: 5, start: 100, unit: "rad/s" },
     { key: "friction", label: "Friction, actual", from: 0, to: 3, step: 0.1, start: 1, unit: "× nominal" },
     { key: "mass", label: "Payload, actual", from: 0.5, to: 1.5, step: 0.05, start: 1, unit: "× nominal" },
-    { key: "fault", label: "Fault", choices: FAULTS, start: "none", unit: "" },
     { key: "x", label: "Gate, x of its middle", from: 300, to: 950, step: 10, start: 600, unit: "mm" },
     { key: "y", label: "Gate, y of its middle", from: -500, to: 500, step: 10, start: 0, unit: "mm" },
     { key: "width", label: "Gate, width", from: 50, to: 500, step: 10, start: 300, unit: "mm" },
@@ -55,7 +48,7 @@ function scenario(set) {
 cycles = 1
 rate_hz = ${set.rate}
 law = "${set.law}"
-start = ${pose(-1)}${set.fault === "none" ? "" : `\nfaults = ["${set.fault}"]`}
+start = ${pose(-1)}
 ${payload}
 [gains]
 bandwidth = ${corner(set.bandwidth, set)}

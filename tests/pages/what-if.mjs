@@ -58,7 +58,7 @@ await withBrowser(async (open) => {
     await sameOnTheCommandLine(page);
     const controls = page.getByRole("region", { name: "Settings" }).locator("input, select");
     const count = await controls.count();
-    check(count === 13, `${count} settings`);
+    check(count === 12, `${count} settings`);
     for (let index = 0; index < count; index += 1) {
         const control = controls.nth(index);
         const name = await control.getAttribute("id");
