@@ -17,7 +17,7 @@ mod parse;
 
 use protocol::messages::Node;
 use protocol::schema::MessageInfo;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 pub use frames::Faulty;
@@ -85,4 +85,9 @@ pub enum FrameFault {
     Corrupt(f64),
     /// Its place is taken by the frame of this message that was sent this many frames before.
     Replay(usize),
+}
+
+/// Seconds to the nearest nanosecond: a decimal fraction of a second is not cut one short.
+fn duration(seconds: f64) -> Duration {
+    Duration::from_nanos((seconds * 1e9).round() as u64)
 }

@@ -8,9 +8,18 @@ pub mod file;
 mod json;
 mod read;
 
+use protocol::messages::FaultAxis;
 use thiserror::Error;
 
 use crate::text::Source;
+
+/// Names of the joints, in order.
+pub const AXES: [&str; 4] = [
+    FaultAxis::Shoulder.name(),
+    FaultAxis::Elbow.name(),
+    FaultAxis::Lift.name(),
+    FaultAxis::Wrist.name(),
+];
 
 /// Models that come with the program: name and text.
 const BUILT_IN: [(&str, &str); 2] = [

@@ -2,19 +2,15 @@
 
 use protocol::messages::{MotionRequest, Refusal, RefusalReason};
 
-/// Joints in order, with the units of their positions and efforts.
-const AXES: [(&str, &str, &str); 4] = [
-    ("shoulder", "rad", "N m"),
-    ("elbow", "rad", "N m"),
-    ("lift", "m", "N"),
-    ("wrist", "rad", "N m"),
-];
+use crate::model::AXES;
+
+/// Units of the joints' positions and efforts, in order.
+const UNITS: [(&str, &str); 4] = [("rad", "N m"), ("rad", "N m"), ("m", "N"), ("rad", "N m")];
 
 /// The refusal as a sentence.
 pub(crate) fn sentence(request: &MotionRequest, refusal: &Refusal) -> String {
     let mut text = refusal.reason.describe().trim_end_matches('.').to_owned();
-    let axis = AXES.get(usize::from(refusal.axis));
-    if let Some((name, ..)) = axis {
+    if let Some(name) = AXES.get(usize::from(refusal.axis)) {
         text += &format!("; axis {name}");
     }
     let (value, limit) = (refusal.value, refusal.limit);
@@ -73,11 +69,11 @@ fn parameter(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str>
 /// Unit of value and limit; `None` where there are none.
 fn unit(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str> {
     use RefusalReason as Reason;
-    let axis = AXES.get(usize::from(refusal.axis));
+    let units = UNITS.get(usize::from(refusal.axis));
     Some(match (request, refusal.reason) {
         (_, Reason::TooFar | Reason::TooNear) => "m",
-        (_, Reason::JointLimit) => axis?.1,
-        (_, Reason::TorqueTooSmall) => axis?.2,
+        (_, Reason::JointLimit) => units?.0,
+        (_, Reason::TorqueTooSmall) => units?.1,
         (_, Reason::PayloadTooHeavy) => "kg",
         (_, Reason::Singular) => "(sine of the elbow)",
         (MotionRequest::Jump { .. }, Reason::OutOfRange) if refusal.limit == 0.0 => "m",

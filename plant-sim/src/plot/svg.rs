@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use protocol::messages::Mode;
+use sim::model::AXES;
 
 use crate::chart::{Svg, ticks};
 
@@ -17,7 +18,6 @@ const PANEL: f64 = 120.0;
 const GAP: f64 = 30.0;
 const STRIP: f64 = 20.0;
 
-const AXES: [&str; 4] = ["shoulder", "elbow", "lift", "wrist"];
 /// Distinguishable with every kind of colour vision (Okabe and Ito 2008).
 const COLOURS: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"];
 

@@ -5,14 +5,11 @@ use std::collections::VecDeque;
 use oorandom::Rand64;
 use protocol::frame::CanFrame;
 use protocol::messages::Node;
-use protocol::time::{Duration, Instant};
+use protocol::time::Instant;
 
-use super::{Fault, FrameFault, What};
+use super::{Fault, FrameFault, What, duration};
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::world::World;
-
-/// Frames of a message that are kept, for replays.
-const HISTORY: usize = 64;
 
 /// A node whose frames suffer the faults of a run. Without faults it is the node itself.
 #[derive(Debug)]
@@ -26,7 +23,7 @@ pub struct Faulty<P> {
 #[derive(Debug)]
 struct Suffered {
     fault: Fault,
-    /// The last frames of the message, the newest last; kept for replays alone.
+    /// Of a replay: the last frames of the message, as many as it goes back; the newest last.
     history: VecDeque<CanFrame>,
 }
 
@@ -67,19 +64,13 @@ impl<P: Peer> Faulty<P> {
             if !info.identifies(&frame) {
                 continue;
             }
+            // A replay needs frames from before it, too.
+            let mut old = None;
             if let FrameFault::Replay(back) = kind {
-                let old = history
-                    .len()
-                    .checked_sub(back)
-                    .and_then(|place| history.get(place).copied());
                 history.push_back(frame);
-                if history.len() > HISTORY {
-                    history.pop_front();
+                if history.len() > back {
+                    old = history.pop_front();
                 }
-                if let (Some(old), true) = (old, fault.acts(time)) {
-                    sent = vec![(time, old)];
-                }
-                continue;
             }
             if !fault.acts(time) {
                 continue;
@@ -100,7 +91,11 @@ impl<P: Peer> Faulty<P> {
                         }
                     }
                 }
-                FrameFault::Replay(_) => {}
+                FrameFault::Replay(_) => {
+                    if let Some(old) = old {
+                        sent = vec![(time, old)];
+                    }
+                }
             }
         }
         out.extend(sent);
@@ -108,9 +103,8 @@ impl<P: Peer> Faulty<P> {
 }
 
 fn delay(sent: &mut Outbox, seconds: f64) {
-    let delay = Duration::from_nanos((seconds * 1e9).round() as u64);
     for (time, _) in sent {
-        *time += delay;
+        *time += duration(seconds);
     }
 }
 

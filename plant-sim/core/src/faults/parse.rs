@@ -2,9 +2,10 @@
 
 use protocol::messages::Node;
 use protocol::table::TABLE;
-use protocol::time::{Duration, Instant};
+use protocol::time::Instant;
 
-use super::{Fault, FrameFault, What};
+use super::{Fault, FrameFault, What, duration};
+use crate::model::AXES;
 use crate::plant::defect::{EncoderDefect, MotorDefect};
 use crate::text::nearest;
 
@@ -110,13 +111,6 @@ pub const KINDS: [Kind; 17] = [
     Kind { place: "payload", has_axis: false, name: "dropped", value: None, about: "the payload falls out of the gripper" },
 ];
 
-const AXES: [&str; 4] = ["shoulder", "elbow", "lift", "wrist"];
-const NODES: [(&str, Node); 3] = [
-    ("controller", Node::Controller),
-    ("drives", Node::Drives),
-    ("operator", Node::Operator),
-];
-
 impl std::str::FromStr for Fault {
     type Err = FaultError;
 
@@ -160,7 +154,7 @@ fn time(text: &str) -> Result<Instant, String> {
     };
     match number.parse::<f64>() {
         Ok(number) if (0.0..=1e6).contains(&(number * scale)) => {
-            Ok(Instant::ORIGIN + Duration::from_nanos((number * scale * 1e9).round() as u64))
+            Ok(Instant::ORIGIN + duration(number * scale))
         }
         _ => Err(format!(
             "{text:?} is not a time; allowed: seconds as 0.3s or milliseconds as 300ms, up to a million seconds"
@@ -174,7 +168,7 @@ fn what_of(text: &str) -> Result<What, String> {
     let message = TABLE
         .iter()
         .find(|info| info.name.eq_ignore_ascii_case(place));
-    let node = NODES.iter().find(|(name, _)| *name == place);
+    let node = Node::from_name(place);
     let group = match (message, node) {
         (Some(_), _) => "message",
         (_, Some(_)) => "node",
@@ -214,7 +208,7 @@ fn what_of(text: &str) -> Result<What, String> {
         ("duplicate", Some(info), _) => What::Frames(info, FrameFault::Duplicate),
         ("corrupt", Some(info), _) => What::Frames(info, FrameFault::Corrupt(value)),
         ("replay", Some(info), _) => What::Frames(info, FrameFault::Replay(value as usize)),
-        (_, _, Some((_, node))) => What::Silent(*node),
+        (_, _, Some(node)) => What::Silent(node),
         ("jump", ..) => What::Encoder(axis, EncoderDefect::Jump(value)),
         ("noise", ..) => What::Encoder(axis, EncoderDefect::Noise(value.abs())),
         ("reversed", ..) => What::Encoder(axis, EncoderDefect::Reversed),
@@ -263,7 +257,7 @@ fn places() -> Vec<&'static str> {
     let mut places: Vec<_> = TABLE
         .iter()
         .map(|info| info.name)
-        .chain(NODES.iter().map(|(name, _)| *name))
+        .chain(Node::ALL.iter().map(|node| node.name()))
         .chain(parts)
         .collect();
     places.dedup();

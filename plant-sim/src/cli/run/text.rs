@@ -5,6 +5,7 @@ use std::path::Path;
 
 use plant_sim::report::FILE;
 use plant_sim::run::Results;
+use sim::model::AXES;
 use sim::setup::RunConfig;
 use sim::summary::Summary;
 
@@ -166,7 +167,7 @@ fn load(summary: &Summary, text: &mut String) {
         format!("  {name:<18}{shoulder:>8} {elbow:>8} {lift:>8} {wrist:>8}\n")
     };
     let percent = |shares: [f64; 4]| shares.map(|share| format!("{:.0} %", share * 100.0));
-    *text += &row("", ["shoulder", "elbow", "lift", "wrist"].map(String::from));
+    *text += &row("", AXES.map(String::from));
     *text += &row("torque, peak", percent(summary.torque_utilisation));
     *text += &row("torque, thermal", percent(summary.thermal_utilisation));
     *text += &row("speed, peak", percent(summary.speed_utilisation));

@@ -7,7 +7,7 @@ use super::super::file::{
     SCREW_LEAD, keys,
 };
 use super::super::json::Node;
-use super::super::{DriveTrain, JointLimits, ModelError};
+use super::super::{AXES, DriveTrain, JointLimits, ModelError};
 use super::each;
 use crate::allowed::Allowed;
 
@@ -67,7 +67,7 @@ fn check_encoder(
         turns_of_nut * drive.gear_ratio[2],
         reach(3) / TAU * drive.gear_ratio[3],
     ];
-    for (turns, axis) in turns.iter().zip(["shoulder", "elbow", "lift", "wrist"]) {
+    for (turns, axis) in turns.iter().zip(AXES) {
         let most = (f64::from(i32::MAX) / (2.0 * turns)).floor();
         if f64::from(drive.encoder_counts) > most {
             return Err(node
