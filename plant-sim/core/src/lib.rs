@@ -13,11 +13,11 @@
 //! world                  what peers share besides the bus: the robot, and what each reports to the run
 //! observer, record       observers of a run, and its trace and truth as text
 //! curves                 what a page draws of a run, in bounded memory
-//! curves                 what a page draws of a run, in bounded memory
 //! bus                    arbitration and exact frame times
 //! plant, model           the robot in f64, derived independently, and its data
 //! metrics                errors, settling, utilisation
 //! rehearsal              a scenario as the controller plans it, without a robot
+//! faults, campaign       what breaks in a run; many runs with faults, judged
 //! ```
 //!
 //! The plant names neither the controller nor the bus.
@@ -40,6 +40,7 @@
 
 mod allowed;
 pub mod bus;
+pub mod campaign;
 pub mod controller;
 mod convert;
 pub mod curves;

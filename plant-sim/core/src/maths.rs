@@ -26,6 +26,16 @@ pub(crate) fn tanh(x: f64) -> f64 {
     libm::tanh(x)
 }
 
+/// Natural logarithm.
+pub(crate) fn ln(x: f64) -> f64 {
+    libm::log(x)
+}
+
+/// Power of e.
+pub(crate) fn exp(x: f64) -> f64 {
+    libm::exp(x)
+}
+
 /// Square, without the freedom that `powi` has.
 pub(crate) fn square(x: f64) -> f64 {
     x * x

@@ -55,6 +55,22 @@ pub fn with_controller<C: Peer, P: Pace, O: Observer>(
     pace: &mut P,
     observer: &mut O,
 ) -> Result<Summary, Failure> {
+    let mut rig = assemble(config, connect)?;
+    let mut observers = (Collector::new(config), observer);
+    match rig.run(pace, &mut observers) {
+        Err(RunError::Output(source)) => Err(Failure::Output(source)),
+        result => Ok(observers.0.finish(config, &rig, &result)),
+    }
+}
+
+/// The rig of a scenario with all its peers, at the origin of time.
+///
+/// # Errors
+/// See [`Failure`].
+pub(crate) fn assemble<'p, C: Peer + 'p>(
+    config: &RunConfig,
+    connect: impl FnOnce(Config) -> Result<C, PeerError>,
+) -> Result<Rig<'p>, Failure> {
     let rig = config.rig()?;
     let controller = connect(rig.controller())?;
     let drives = Drives::new(&rig.actual, rig.period);
@@ -68,9 +84,5 @@ pub fn with_controller<C: Peer, P: Pace, O: Observer>(
     let operator = Operator::new(&config.scenario);
     rig.attach(Faulty::new(operator, Node::Operator, faults, *seed));
     rig.attach(Faulty::new(controller, Node::Controller, faults, *seed));
-    let mut observers = (Collector::new(config), observer);
-    match rig.run(pace, &mut observers) {
-        Err(RunError::Output(source)) => Err(Failure::Output(source)),
-        result => Ok(observers.0.finish(config, &rig, &result)),
-    }
+    Ok(rig)
 }

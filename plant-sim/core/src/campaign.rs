@@ -1,0 +1,23 @@
+//! Campaigns: many short runs with a fault each, and a judge who holds every one to what [`expect`] and [`bounds`] promise.
+//!
+//! ```text
+//! case      situations x faults x windows, and each case of them
+//! expect    by when a fault has to be detected, and which ones a sound system survives
+//! bounds    how far, fast and deep the arm may go, from the robot's own limits
+//! judge     the observer who compares a run with both (its measure of the lift in lift)
+//! verdict   what a case is held to, and what became of it
+//! trial     one case: the run, what follows it, and the verdict
+//! tally     worst cases by fault and situation, and the bound of the miss rate
+//! ```
+//!
+//! The judge knows the robot's truth and what is on the bus. It does not read the controller's table of faults: `expect` is
+//! written by hand from the documents, so that an error in one of them shows.
+
+pub mod bounds;
+pub mod case;
+pub mod expect;
+pub mod judge;
+mod lift;
+pub mod tally;
+pub mod trial;
+pub mod verdict;

@@ -1,0 +1,179 @@
+//! How far, fast and deep the arm may go, from the robot's own limits and from the parameters that docs/protocol.md promises.
+//!
+//! | bound | where from |
+//! |---|---|
+//! | no motor is asked for more than its peak torque | model |
+//! | an axis off its reference, too fast or out of its range is reported at the 4th sample in a row | default parameters: three samples, and one to answer |
+//! | torque is off 0.4 s after a fault was reported | twice the time in which the slowest axis stops from full speed at its acceleration and jerk, and the time of the brake |
+//! | while torque is on after that, the tool travels no further than at its greatest speed for the time of such a stop | the same |
+//! | no kinetic energy beyond that of all axes at 1.1 times their speed limit | the monitor's speed limit |
+//! | once torque is off, no kinetic energy but from the weight of the lift | nothing else drives the arm |
+//! | the lift goes down no further than under the greatest torque for 8 samples, in free fall for 30 ms, and what brake or motor need to stop it | the drives hold the last torque; the brake closes in 30 ms |
+//! | after standstill nothing moves by a tenth of a millimetre | what stands, stands |
+
+use nalgebra::Vector4;
+
+use crate::model::{Payload, RobotModel};
+use crate::plant::arm::Arm;
+use crate::plant::brake::Brake;
+use crate::plant::drive::Drive;
+use crate::plant::stop::EndStops;
+
+const LIFT: usize = 2;
+
+/// Following error of an axis that stops the arm: rad, rad, m, rad.
+pub const FOLLOWING_ERROR: [f64; 4] = [0.05, 0.05, 0.01, 0.2];
+/// How far past its range an axis may go.
+const RANGE_MARGIN: [f64; 4] = [0.02, 0.02, 0.002, 0.05];
+/// Speed that stops the arm, as a multiple of the axis' limit.
+const SPEED_FACTOR: f64 = 1.1;
+/// Consecutive samples beyond a limit until it is reported, the sample of the answer included.
+pub const SAMPLES_TO_REPORT: u32 = 4;
+/// Samples from a report until the brake is told at the latest: the drives hold a command for 5 samples, and a stop that an axis does
+/// not follow is given up at the 4th sample.
+const SAMPLES_TO_BRAKE: f64 = 8.0;
+/// The brake closes within this, s.
+const BRAKE_S: f64 = 0.03;
+/// The controller waits this long for the brake, s.
+const BRAKE_WAIT_S: f64 = 0.06;
+/// Movement of a standing axis that does not count, rad and m.
+pub const STANDING: f64 = 1e-4;
+/// Rounding of f32 and of the integrator.
+const ROUNDING: f64 = 1e-4;
+
+/// Bounds for one robot and its payload.
+#[derive(Clone, Debug)]
+pub struct Bounds {
+    model: RobotModel,
+    arm: Arm,
+    drive: Drive,
+    stops: EndStops,
+    payload: f64,
+    period: f64,
+}
+
+impl Bounds {
+    /// The bounds for `model`, sampled every `period` seconds, with nothing in the gripper.
+    pub fn new(model: &RobotModel, period: f64) -> Self {
+        let (arm, drive) = (Arm::new(model, None), Drive::new(&model.drive));
+        let stretched = arm.mass_matrix(&arm.at(&Vector4::zeros())) + drive.rotor_inertia();
+        Self {
+            model: model.clone(),
+            arm,
+            drive,
+            stops: EndStops::new(&model.limits, &stretched.diagonal()),
+            payload: 0.0,
+            period,
+        }
+    }
+
+    /// Takes a payload into account. One that falls out of the gripper still counts: it falls on something.
+    pub fn carry(&mut self, payload: &Payload) {
+        self.arm = Arm::new(&self.model, Some(payload));
+        self.payload = payload.mass;
+    }
+
+    /// Whether the motors may be asked for these torques, N m.
+    pub fn allows_torque(&self, torque: &[f32; 4]) -> bool {
+        let limits = self.model.drive.motor_torque_limit;
+        let mut both = torque.iter().zip(limits);
+        both.all(|(asked, limit)| f64::from(asked.abs()) <= limit * (1.0 + ROUNDING))
+    }
+
+    /// Whether an axis is off its reference, too fast, or out of its range.
+    pub fn is_beyond(&self, q: &[f64; 4], qd: &[f64; 4], reference: &[f64; 4]) -> [bool; 3] {
+        let limits = &self.model.limits;
+        let any = |of: &dyn Fn(usize) -> bool| (0..4).any(of);
+        [
+            // The reference is as old as the sample before: a sample at full speed is allowed for.
+            any(&|i| {
+                let moved = SPEED_FACTOR * limits.velocity[i] * self.period;
+                (reference[i] - q[i]).abs() > FOLLOWING_ERROR[i] + moved
+            }),
+            any(&|i| qd[i].abs() > limits.velocity[i] * SPEED_FACTOR * (1.0 + ROUNDING)),
+            any(&|i| {
+                let room = RANGE_MARGIN[i] + ROUNDING;
+                !(limits.lower[i] - room..=limits.upper[i] + room).contains(&q[i])
+            }),
+        ]
+    }
+
+    /// Kinetic energy of arm, rotors and payload, J.
+    pub fn energy(&self, q: &[f64; 4], qd: &[f64; 4]) -> f64 {
+        let (q, qd) = (Vector4::from(*q), Vector4::from(*qd));
+        let rotors = 0.5 * qd.dot(&(self.drive.rotor_inertia() * qd));
+        self.arm.kinetic_energy(&self.arm.at(&q), &qd) + rotors
+    }
+
+    /// Energy in the springs of the end stops, J.
+    pub fn elastic(&self, q: &[f64; 4]) -> f64 {
+        self.stops.energy(&Vector4::from(*q))
+    }
+
+    /// The most kinetic energy at this pose that the speed limits allow, J.
+    pub fn energy_limit(&self, q: &[f64; 4]) -> f64 {
+        let speed = self.model.limits.velocity.map(|limit| SPEED_FACTOR * limit);
+        let signed = |signs: u32| {
+            let qd = std::array::from_fn(|i| {
+                if signs >> i & 1 == 0 {
+                    speed[i]
+                } else {
+                    -speed[i]
+                }
+            });
+            self.energy(q, &qd)
+        };
+        // The opposite of all four has the same energy.
+        (0..8).map(signed).fold(0.0, f64::max)
+    }
+
+    /// Energy that the moving part of the lift sets free on its way from `high` to `low` (m, downwards positive), J.
+    pub fn weight_work(&self, high: f64, low: f64) -> f64 {
+        (self.lifted() * self.model.gravity * (low - high)).max(0.0)
+    }
+
+    /// Longest time from a report until torque is off, s.
+    pub fn torque_off_s(&self) -> f64 {
+        self.stop_s() + BRAKE_WAIT_S + SAMPLES_TO_BRAKE * self.period
+    }
+
+    /// Longest time of a controlled stop, s.
+    pub fn stop_s(&self) -> f64 {
+        let limits = &self.model.limits;
+        let axis = |i: usize| {
+            limits.velocity[i] / limits.acceleration[i] + limits.acceleration[i] / limits.jerk[i]
+        };
+        2.0 * (0..4).map(axis).fold(0.0, f64::max)
+    }
+
+    /// How far the lift may go down that moves down at `speed` (m/s) when its fault is reported, m.
+    pub fn drop(&self, speed: f64) -> f64 {
+        let gravity = self.model.gravity.max(0.0);
+        let effort = self.model.limits.effort[LIFT];
+        let mass = self.lifted() + self.drive.rotor_inertia()[(LIFT, LIFT)];
+        let weight = self.lifted() * gravity;
+        // The last torque that was commanded may be the greatest, downwards.
+        let driven = effort + weight;
+        let (held, fastest) = fall(
+            speed.max(0.0),
+            driven / mass,
+            SAMPLES_TO_BRAKE * self.period,
+        );
+        let (fallen, fastest) = fall(fastest, gravity, BRAKE_S);
+        // The weaker of the two that can stop it.
+        let holding = effort.min(Brake::new(effort).capacity());
+        let slowing = (holding - weight) / mass;
+        held + fallen + fastest * fastest / (2.0 * slowing)
+    }
+
+    /// Mass that goes up and down, kg.
+    fn lifted(&self) -> f64 {
+        self.model.links[2].mass + self.model.links[3].mass + self.payload
+    }
+}
+
+/// Way and speed after `time` at this acceleration.
+fn fall(speed: f64, acceleration: f64, time: f64) -> (f64, f64) {
+    let way = speed * time + 0.5 * acceleration * time * time;
+    (way, speed + acceleration * time)
+}

@@ -1,0 +1,122 @@
+//! By when a fault has to be detected, and which faults a sound system survives: written by hand from docs/safety.md,
+//! docs/protocol.md and the fault table of the design, for a link at the default parameters.
+//!
+//! | fault | promise | why |
+//! |---|---|---|
+//! | nothing; noise of a sound encoder; frames doubled | the scenario ends as without it | no reason to stop |
+//! | up to 2 feedback frames lost or damaged | the same | a gap of 5 ms is bridged, three bad frames stop |
+//! | up to 3 commands lost or damaged | the same | the drives hold a command for 5 samples |
+//! | 3 feedback frames damaged in a row | 4 samples | three bad frames, and one sample to answer |
+//! | feedback or commands gone | 8 samples | the drives switch off after 5 samples without a command, seen 2 samples later, and a frame may have been on its way |
+//! | 4 old feedback frames in a row | 5 samples | the third repeated or old frame |
+//! | an encoder that jumps further than the following error allows | 4 samples | three samples beyond a limit, and one to answer |
+//!
+//! Whatever else breaks is judged by its effect: see [`super::bounds`].
+
+use protocol::messages::{Cause, Node};
+use protocol::schema::Content;
+use protocol::time::{Duration, Instant, Period};
+
+use super::bounds::FOLLOWING_ERROR;
+use crate::faults::{Fault, FrameFault, What};
+use crate::plant::defect::EncoderDefect;
+
+/// Noise of a sound encoder, rad and m: two of its counts at the shoulder.
+const SOUND_NOISE: f64 = 1.2e-6;
+
+/// What has to follow from a fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Expected {
+    /// Nothing: the scenario ends as if it had not been there.
+    Survived,
+    /// It is detected by then.
+    DetectedBy(Instant),
+    /// It may be detected or survived; its effect is what counts.
+    Either,
+}
+
+/// What has to follow from these faults together.
+pub fn expected(faults: &[Fault], period: Period) -> Expected {
+    let each = faults.iter().map(|fault| of(fault, period));
+    each.fold(Expected::Survived, |all, one| match (all, one) {
+        (Expected::DetectedBy(a), Expected::DetectedBy(b)) => Expected::DetectedBy(a.min(b)),
+        (first @ Expected::DetectedBy(_), _) | (_, first @ Expected::DetectedBy(_)) => first,
+        (Expected::Either, _) | (_, Expected::Either) => Expected::Either,
+        (Expected::Survived, Expected::Survived) => Expected::Survived,
+    })
+}
+
+fn of(fault: &Fault, period: Period) -> Expected {
+    let lasts = fault.until.since(fault.from);
+    let samples = |count: u32| period.duration() * count;
+    // A fault of up to `few` samples is survived, one of `enough` is detected within `limit`.
+    let by_length = |few, enough, limit| {
+        if lasts <= samples(few) {
+            Expected::Survived
+        } else if lasts >= samples(enough) {
+            Expected::DetectedBy(fault.from + samples(limit))
+        } else {
+            Expected::Either
+        }
+    };
+    match fault.what {
+        What::Silent(Node::Drives) => by_length(2, 9, 8),
+        What::Silent(Node::Controller) => no_survival(by_length(0, 9, 8)),
+        What::Frames(info, kind) => match (info.content, kind) {
+            (_, FrameFault::Duplicate) => Expected::Survived,
+            (Content::Feedback, FrameFault::Loss(1.0)) => by_length(2, 9, 8),
+            (Content::Feedback, FrameFault::Corrupt(1.0)) => by_length(2, 4, 4),
+            (Content::Feedback, FrameFault::Replay(back)) if back >= 4 => {
+                no_survival(by_length(0, 5, 5))
+            }
+            (Content::Command, FrameFault::Loss(1.0) | FrameFault::Corrupt(1.0)) => {
+                by_length(3, 9, 8)
+            }
+            (Content::Feedback | Content::Command, FrameFault::Delay(late))
+                if Duration::from_seconds(late) >= samples(9) =>
+            {
+                no_survival(by_length(0, 9, 8))
+            }
+            _ => Expected::Either,
+        },
+        What::Encoder(axis, EncoderDefect::Jump(by)) if by.abs() > 2.0 * FOLLOWING_ERROR[axis] => {
+            no_survival(by_length(0, 4, 4))
+        }
+        What::Encoder(_, EncoderDefect::Noise(most)) if most <= SOUND_NOISE => Expected::Survived,
+        _ => Expected::Either,
+    }
+}
+
+/// A short one may be survived, but need not.
+fn no_survival(expected: Expected) -> Expected {
+    match expected {
+        Expected::Survived => Expected::Either,
+        other => other,
+    }
+}
+
+/// How late a fault of the link makes a command that its sender sent in time.
+pub(super) fn lateness(faults: &[Fault], period: Period) -> Duration {
+    let late = |fault: &Fault| match fault.what {
+        What::Frames(info, kind) if info.content == Content::Command => match kind {
+            FrameFault::Delay(s) | FrameFault::Jitter(s) => Duration::from_seconds(s),
+            FrameFault::Replay(back) => period.duration() * back as u32,
+            _ => Duration::ZERO,
+        },
+        _ => Duration::ZERO,
+    };
+    faults.iter().map(late).max().unwrap_or(Duration::ZERO)
+}
+
+/// Causes that leave the loops to be trusted: the brake has closed before torque goes off.
+pub(super) fn stops_under_control(cause: Cause) -> bool {
+    matches!(
+        cause,
+        Cause::FeedbackLost
+            | Cause::Reordered
+            | Cause::Corrupted
+            | Cause::SoftLimit
+            | Cause::EStop
+            | Cause::DriveFault
+    )
+}

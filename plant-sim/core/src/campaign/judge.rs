@@ -1,0 +1,368 @@
+//! The observer who judges a run with faults.
+
+use std::collections::BTreeSet;
+use std::io;
+
+use protocol::codec;
+use protocol::frame::CanFrame;
+use protocol::messages::{
+    Cause, ControlWord, Emergency, Message, Mode, Motion, MotionRequest, Node,
+};
+use protocol::time::{Duration, Instant, Period};
+
+use super::bounds::{Bounds, SAMPLES_TO_REPORT, STANDING};
+use super::expect::{Expected, expected, lateness, stops_under_control};
+use super::lift::Lift;
+use super::verdict::{Requirement, Verdict};
+use crate::maths::square;
+use crate::observer::{Observer, PlantState, Truth};
+use crate::setup::RunConfig;
+use crate::world::CellEvent;
+
+/// Joint speed below which an axis counts as at rest, rad/s and m/s.
+const RESTING: f64 = 1e-3;
+/// J that energies may differ by: a tenth of what a hand feels.
+const ENERGY_TOLERANCE: f64 = 0.1;
+
+/// The arm at the moment of a change.
+#[derive(Clone, Copy, Debug)]
+struct Mark {
+    time: f64,
+    lift: f64,
+    /// Of the motion and of the springs of the end stops, J.
+    energy: f64,
+}
+
+/// The observer who judges a run with faults.
+pub struct Judge {
+    period: Period,
+    bounds: Bounds,
+    /// Beginning of the first fault; the end of time without one.
+    onset: Instant,
+    expected: Expected,
+    /// Longest time from a report to the last command that does not know of it.
+    reaction: Duration,
+    missed: BTreeSet<Requirement>,
+    /// The last command, its sender being alive.
+    control: ControlWord,
+    /// Its time.
+    commanded: Instant,
+    /// Counter and sequence number of the operator's last request.
+    request: (u8, u8),
+    report: Option<(Instant, Cause)>,
+    /// Whether more was reported while the arm stopped, which closes the brake at once.
+    escalated: bool,
+    /// When the drives switched off by themselves.
+    cut: Option<f64>,
+    /// The arm when the fault was detected.
+    detected: Option<Mark>,
+    /// The arm when torque went off, since when it has stayed off.
+    off: Option<Mark>,
+    /// Samples in a row with an axis beyond each kind of limit.
+    beyond: [u32; 3],
+    last: Option<PlantState>,
+    /// Last time of a motion.
+    moving: f64,
+    distance: f64,
+    /// Of `distance`, what was travelled under torque after the detection.
+    driven: f64,
+    fastest: f64,
+    energy: f64,
+    lift: Lift,
+    /// The arm when the run had ended.
+    rest: Option<PlantState>,
+    mode: Mode,
+    survived: bool,
+}
+
+impl Judge {
+    /// A judge of this run.
+    pub fn new(config: &RunConfig) -> Self {
+        let scenario = &config.scenario;
+        let period = Period::of_rate(scenario.rate_hz);
+        let onset = scenario.faults.iter().map(|fault| fault.from).min();
+        Self {
+            period,
+            bounds: Bounds::new(&config.actual, period.duration().seconds()),
+            onset: onset.unwrap_or(Instant::MAX),
+            expected: expected(&scenario.faults, period),
+            reaction: period.duration() + lateness(&scenario.faults, period),
+            missed: BTreeSet::new(),
+            control: ControlWord::EMPTY,
+            commanded: Instant::ORIGIN,
+            request: (0, 0),
+            report: None,
+            escalated: false,
+            cut: None,
+            detected: None,
+            off: None,
+            beyond: [0; 3],
+            last: None,
+            moving: 0.0,
+            distance: 0.0,
+            driven: 0.0,
+            fastest: 0.0,
+            energy: 0.0,
+            lift: Lift::default(),
+            rest: None,
+            mode: Mode::Boot,
+            survived: false,
+        }
+    }
+
+    /// The scenario has ended some time ago, completed or not. What follows is to be still.
+    pub fn ended(&mut self, completed: bool) {
+        self.survived = completed && !self.is_detected();
+        self.rest = self.last;
+        // Without feedback it may still be waiting for the brake.
+        let is_latched = matches!(self.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop);
+        if self.report.is_some() && !is_latched {
+            self.miss(Requirement::Latch);
+        }
+        if self.expected == Expected::Survived && !self.survived {
+            self.miss(Requirement::NoFalseAlarm);
+        }
+    }
+
+    /// The request to switch on that a latched fault has to refuse; `None` without one.
+    pub fn temptation(&self) -> Option<CanFrame> {
+        self.report?;
+        let (counter, sequence) = self.request;
+        let enable = Message::Motion(Motion {
+            sequence: sequence.wrapping_add(1),
+            request: MotionRequest::Enable,
+        });
+        codec::encode(&enable, counter.wrapping_add(1)).ok()
+    }
+
+    /// The verdict.
+    pub fn finish(mut self) -> Verdict {
+        let onset = self.onset.seconds();
+        let since = |time: f64| Some(round((time - onset) * 1e3));
+        self.judge_fall();
+        let end = self.last.map_or(0.0, |last| last.t);
+        let is_commanded = end - self.commanded.seconds() < 5.0 * self.period.duration().seconds();
+        if self.report.is_some()
+            && is_commanded
+            && self.control.contains(ControlWord::TORQUE_ENABLE)
+        {
+            self.miss(Requirement::Standstill);
+        }
+        let stopped = self.detected.is_some();
+        let at = match (self.report, self.cut) {
+            (Some((time, _)), Some(cut)) => Some(time.seconds().min(cut)),
+            (Some((time, _)), None) => Some(time.seconds()),
+            (None, cut) => cut,
+        };
+        Verdict {
+            survived: self.survived,
+            detected: match self.report {
+                Some((_, cause)) => Some(cause.name().into()),
+                None => self.cut.map(|_| "drives".into()),
+            },
+            detection_ms: at.and_then(since),
+            standstill_ms: stopped.then_some(self.moving.max(onset)).and_then(since),
+            distance_mm: stopped.then(|| round(self.distance * 1e3)),
+            energy_j: (self.onset < Instant::MAX).then(|| round(self.energy)),
+            drop_mm: stopped.then(|| round(self.lift.drop() * 1e3)),
+            missed: self.missed,
+        }
+    }
+
+    fn miss(&mut self, requirement: Requirement) {
+        self.missed.insert(requirement);
+    }
+
+    fn is_detected(&self) -> bool {
+        self.report.is_some() || self.cut.is_some()
+    }
+
+    /// The controller has commanded the drives.
+    fn commanded(&mut self, time: Instant, control: ControlWord, torque: &[f32; 4]) {
+        if !self.bounds.allows_torque(torque) {
+            self.miss(Requirement::Torque);
+        }
+        let normal = control.contains(ControlWord::TORQUE_ENABLE)
+            && control.contains(ControlWord::BRAKE_RELEASE)
+            && !control.contains(ControlWord::QUICK_STOP);
+        if let Some((reported, _)) = self.report
+            && normal
+            && time.since(reported) > self.reaction
+        {
+            self.miss(Requirement::Reaction);
+        }
+        // A fault that has switched torque off keeps it off.
+        if self.report.is_some()
+            && control.contains(ControlWord::TORQUE_ENABLE)
+            && !self.control.contains(ControlWord::TORQUE_ENABLE)
+        {
+            self.miss(Requirement::Latch);
+        }
+        self.control = control;
+        self.commanded = time;
+    }
+
+    fn watch_limits(&mut self, truth: &Truth) {
+        let Truth { plant, mind } = truth;
+        let beyond = self.bounds.is_beyond(&plant.q, &plant.qd, &mind.q);
+        for (count, is_beyond) in self.beyond.iter_mut().zip(beyond) {
+            *count = if is_beyond { *count + 1 } else { 0 };
+        }
+        if self.beyond.iter().any(|count| *count > SAMPLES_TO_REPORT) {
+            self.miss(Requirement::Reported);
+        }
+    }
+
+    /// Everything that counts from the beginning of the fault on.
+    fn measure(&mut self, plant: &PlantState, reference: f64) {
+        let energy = self.bounds.energy(&plant.q, &plant.qd);
+        let is_driven = plant.tau != [0.0; 4];
+        if let Some(last) = &self.last {
+            let way = (0..3).map(|i| square(plant.tool[i] - last.tool[i]));
+            let way = way.sum::<f64>().sqrt();
+            self.distance += way;
+            if self.detected.is_some() && is_driven {
+                self.driven += way;
+            }
+            self.fastest = self.fastest.max(way / self.period.duration().seconds());
+        }
+        self.energy = self.energy.max(energy);
+        if is_moving(plant) {
+            self.moving = plant.t + self.period.duration().seconds();
+        }
+        if energy > self.bounds.energy_limit(&plant.q) {
+            self.miss(Requirement::Energy);
+        }
+        let elastic = self.bounds.elastic(&plant.q);
+        let mark = Mark {
+            time: plant.t,
+            lift: plant.q[2],
+            energy: energy + elastic,
+        };
+        if self.is_detected() {
+            self.detected.get_or_insert(mark);
+            self.lift.follow(plant, reference, is_driven);
+            self.judge_stop(mark, is_driven, elastic > 0.0);
+        }
+    }
+
+    /// The way of the arm to standstill, once its fault has been detected.
+    fn judge_stop(&mut self, now: Mark, is_driven: bool, on_stop: bool) {
+        let Some(detected) = self.detected else {
+            return;
+        };
+        if is_driven {
+            let was_off = self.off.take().is_some();
+            if self.report.is_none() {
+                // The drives had switched off, and nobody is told that they are on again.
+                if was_off {
+                    self.miss(Requirement::Latch);
+                }
+                return;
+            }
+            if now.time - detected.time > self.bounds.torque_off_s() {
+                self.miss(Requirement::Standstill);
+            }
+            if self.driven > self.fastest * self.bounds.stop_s() {
+                self.miss(Requirement::Distance);
+            }
+            return;
+        }
+        // Torque has been off for a whole sample at the next one.
+        let off = self.off.get_or_insert(now);
+        if on_stop {
+            // What an end stop gives back depends on the steps in which the plant takes the impact.
+            off.energy = now.energy;
+        }
+        let fallen = self.bounds.weight_work(off.lift, now.lift);
+        if now.energy > off.energy * 1.001 + fallen + ENERGY_TOLERANCE {
+            self.miss(Requirement::Energy);
+        }
+    }
+
+    fn judge_fall(&mut self) {
+        // An arm that went on moved as it was meant to.
+        let went_on = self.report.is_none() && self.missed.contains(&Requirement::Latch);
+        if !went_on && self.lift.drop() > self.bounds.drop(self.lift.speed()) {
+            self.miss(Requirement::Drop);
+        }
+        let is_controlled = self.cut.is_none()
+            && !self.escalated
+            && self
+                .report
+                .is_some_and(|(_, cause)| stops_under_control(cause));
+        if is_controlled && self.lift.sunk() > STANDING {
+            self.miss(Requirement::Drop);
+        }
+    }
+}
+
+impl Observer for Judge {
+    fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        let Ok(received) = codec::decode(frame) else {
+            return Ok(());
+        };
+        match received.message {
+            Message::Command(command) => self.commanded(time, command.control, &command.torque),
+            Message::Emergency(Node::Controller, Emergency { cause, .. })
+                if cause != Cause::None =>
+            {
+                self.escalated |= self.report.is_some();
+                self.report.get_or_insert((time, cause));
+            }
+            Message::Motion(motion) => {
+                self.request = (received.counter.unwrap_or(0), motion.sequence);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn sample(&mut self, truth: &Truth) -> io::Result<()> {
+        let plant = &truth.plant;
+        let is_powered = self.control.contains(ControlWord::TORQUE_ENABLE);
+        self.mode = truth.mind.mode;
+        if is_powered && plant.tau == [0.0; 4] && self.last.is_some_and(|last| last.tau != [0.0; 4])
+        {
+            self.cut.get_or_insert(plant.t);
+        }
+        if is_powered && !self.is_detected() {
+            self.watch_limits(truth);
+        }
+        let now = Instant::ORIGIN + Duration::from_seconds(plant.t);
+        if let Expected::DetectedBy(due) = self.expected
+            && self.rest.is_none()
+            && now >= due
+            && is_powered
+            && !self.is_detected()
+        {
+            self.miss(Requirement::Detected);
+        }
+        if now >= self.onset && self.rest.is_none() {
+            self.measure(plant, truth.mind.q[2]);
+        }
+        if let Some(rest) = &self.rest {
+            let moved = (0..4).any(|i| (plant.q[i] - rest.q[i]).abs() > STANDING);
+            if moved {
+                self.missed.insert(Requirement::Still);
+            }
+        }
+        self.last = Some(*plant);
+        Ok(())
+    }
+
+    fn cell_event(&mut self, event: &CellEvent) {
+        if let CellEvent::Attach(payload) = event {
+            self.bounds.carry(payload);
+        }
+    }
+}
+
+fn is_moving(plant: &PlantState) -> bool {
+    plant.qd.iter().any(|qd| qd.abs() > RESTING)
+}
+
+/// To thousandths: what a line of results needs.
+fn round(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}

@@ -1,0 +1,219 @@
+//! Worst cases by fault and situation, and how often a requirement was missed.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::case::{Case, kinds};
+use super::verdict::{Requirement, Verdict};
+use crate::maths::{exp, ln};
+
+/// A line of results: a case and what became of it.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+pub struct Outcome {
+    /// Which.
+    pub case: Case,
+    /// What became of it.
+    pub verdict: Verdict,
+}
+
+/// Counts and worst cases of many outcomes. Its size is that of the tables, however many there are.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    all: Row,
+    /// By kind of fault and situation.
+    rows: BTreeMap<(String, String), Row>,
+    /// Missed cases by kind of fault and requirement, and the first of them.
+    misses: BTreeMap<(String, Requirement), (u64, u64)>,
+}
+
+/// Counts and worst cases of a kind of fault in a situation.
+#[derive(Clone, Debug, Default)]
+struct Row {
+    cases: u64,
+    missed: u64,
+    survived: u64,
+    detection_ms: Worst,
+    standstill_ms: Worst,
+    distance_mm: Worst,
+    energy_j: Worst,
+    drop_mm: Worst,
+}
+
+/// The greatest of the values present.
+#[derive(Clone, Copy, Debug, Default)]
+struct Worst(Option<f64>);
+
+impl Worst {
+    fn add(&mut self, value: Option<f64>) {
+        self.0 = [self.0, value].into_iter().flatten().reduce(f64::max);
+    }
+}
+
+impl fmt::Display for Worst {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(value) => write!(f, "{value:.1}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Row {
+    fn add(&mut self, verdict: &Verdict) {
+        self.cases += 1;
+        self.missed += u64::from(!verdict.missed.is_empty());
+        self.survived += u64::from(verdict.survived);
+        self.detection_ms.add(verdict.detection_ms);
+        self.standstill_ms.add(verdict.standstill_ms);
+        self.distance_mm.add(verdict.distance_mm);
+        self.energy_j.add(verdict.energy_j);
+        self.drop_mm.add(verdict.drop_mm);
+    }
+}
+
+impl Tally {
+    /// Counts one more.
+    pub fn add(&mut self, outcome: &Outcome) {
+        let Outcome { case, verdict } = outcome;
+        let kinds = kinds(&case.faults);
+        for requirement in &verdict.missed {
+            let miss = self.misses.entry((kinds.clone(), *requirement));
+            let (count, first) = miss.or_insert((0, case.case));
+            *count += 1;
+            *first = case.case.min(*first);
+        }
+        self.all.add(verdict);
+        let row = self.rows.entry((kinds, case.situation.clone()));
+        row.or_default().add(verdict);
+    }
+
+    /// Number of cases.
+    pub fn cases(&self) -> u64 {
+        self.all.cases
+    }
+
+    /// Number of cases that missed a requirement.
+    pub fn missed(&self) -> u64 {
+        self.all.missed
+    }
+
+    /// What was missed by which kind of fault.
+    pub fn misses(&self) -> BTreeSet<(String, Requirement)> {
+        self.misses.keys().cloned().collect()
+    }
+}
+
+/// The report, as Markdown.
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "| fault | situation | cases | missed | survived | detected, ms | standstill, ms | way, mm | energy, J | lift down, mm |"
+        )?;
+        writeln!(f, "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|")?;
+        for ((kinds, situation), row) in &self.rows {
+            writeln!(
+                f,
+                "| {kinds} | {situation} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                row.cases,
+                row.missed,
+                row.survived,
+                row.detection_ms,
+                row.standstill_ms,
+                row.distance_mm,
+                row.energy_j,
+                row.drop_mm
+            )?;
+        }
+        let Row { cases, missed, .. } = self.all;
+        let bound = miss_rate_bound(cases, missed) * 100.0;
+        writeln!(
+            f,
+            "\n{cases} cases: {} held, {missed} missed a requirement; with a confidence of 95 % fewer than {bound:.3} % do \
+             (Clopper-Pearson)",
+            cases - missed
+        )?;
+        if self.misses.is_empty() {
+            return Ok(());
+        }
+        writeln!(
+            f,
+            "\n| fault | missed | cases | the first |\n|---|---|--:|--:|"
+        )?;
+        for ((kinds, requirement), (count, first)) in &self.misses {
+            writeln!(
+                f,
+                "| {kinds} | {} | {count} | {first} |",
+                requirement.name()
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Upper bound of a rate of which `missed` in `cases` were seen, with a confidence of 95 % (Clopper and Pearson 1934): the rate
+/// at which so few would be seen only once in twenty times.
+pub fn miss_rate_bound(cases: u64, missed: u64) -> f64 {
+    if missed >= cases {
+        return 1.0;
+    }
+    let (mut low, mut high) = (missed as f64 / cases as f64, 1.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if at_most(cases as f64, missed, middle) > 0.05 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+/// Probability of at most `most` hits in `n` trials of probability `p`.
+fn at_most(n: f64, most: u64, p: f64) -> f64 {
+    // The first terms are far below the least number there is: their logarithms are not. From the greatest term that counts
+    // the terms fall in both directions, so the sum is taken relative to it.
+    let odds = ln(p) - ln(1.0 - p);
+    let mut term = n * ln(1.0 - p);
+    let (mut scale, mut sum) = (term, 1.0);
+    for hits in 0..most {
+        term += ln((n - hits as f64) / (hits as f64 + 1.0)) + odds;
+        if term > scale {
+            sum = sum * exp(scale - term) + 1.0;
+            scale = term;
+        } else {
+            sum += exp(term - scale);
+        }
+    }
+    exp(scale + ln(sum))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The two cases with a closed form: no hit, and one short of all.
+    #[test]
+    fn bounds_without_a_hit_and_with_all_but_one_are_powers() {
+        for n in [1_u64, 2, 10, 59, 1000, 100_000, 1_000_000] {
+            let none = 1.0 - exp(ln(0.05) / n as f64);
+            assert!((miss_rate_bound(n, 0) / none - 1.0).abs() < 1e-9, "{n}");
+        }
+        for n in [2_u64, 10, 1000, 100_000] {
+            let all_but_one = exp(ln(0.95) / n as f64);
+            let bound = miss_rate_bound(n, n - 1);
+            assert!((bound - all_but_one).abs() < 1e-9, "{n}: {bound}");
+        }
+        assert_eq!(miss_rate_bound(5, 5), 1.0);
+        assert_eq!(miss_rate_bound(0, 0), 1.0);
+    }
+
+    /// Five of a hundred, from the sum of binomials with exact coefficients.
+    #[test]
+    fn a_bound_in_between_is_that_of_the_definition() {
+        assert!((miss_rate_bound(100, 5) - 0.102_253_377_6).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,55 @@
+//! One case of a campaign: the run, what follows it, and the verdict.
+
+use firmware::control::controller::Config;
+use protocol::time::Duration;
+
+use super::judge::Judge;
+use super::verdict::Verdict;
+use crate::observer::Observer;
+use crate::peer::{Peer, PeerError};
+use crate::rig::{Rig, RunError};
+use crate::run::{Failure, assemble};
+use crate::setup::RunConfig;
+
+/// How long the arm has after the end of its run to come to rest, is watched then, and again after a request to switch on.
+const WATCHED: Duration = Duration::from_millis(50);
+
+/// Runs a case with the controller that `connect` starts, and judges it. Then the rig and the end of the run are there for
+/// whoever wants a summary.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn run<'p, C: Peer + 'p, O: Observer>(
+    config: &RunConfig,
+    connect: impl FnOnce(Config) -> Result<C, PeerError>,
+    observer: &mut O,
+) -> Result<(Verdict, Rig<'p>, Result<(), RunError>), Failure> {
+    let mut rig = assemble(config, connect)?;
+    let mut observers = (Judge::new(config), observer);
+    let result = rig.run(&mut (), &mut observers);
+    // A scenario ends as soon as torque is off: time to come to rest.
+    watch(&mut rig, &mut observers)?;
+    observers.0.ended(result.is_ok());
+    watch(&mut rig, &mut observers)?;
+    if let Some(frame) = observers.0.temptation() {
+        rig.inject(&frame);
+        watch(&mut rig, &mut observers)?;
+    }
+    match result {
+        Err(RunError::Output(source)) => Err(Failure::Output(source)),
+        result => Ok((observers.0.finish(), rig, result)),
+    }
+}
+
+fn watch<O: Observer>(rig: &mut Rig<'_>, observer: &mut O) -> Result<(), Failure> {
+    let until = rig.now() + WATCHED;
+    while rig.now() < until {
+        match rig.step(&mut (), observer) {
+            Ok(()) => {}
+            Err(RunError::Output(source)) => return Err(Failure::Output(source)),
+            // The controller in another process has ended: there is nothing left to watch.
+            Err(_) => return Ok(()),
+        }
+    }
+    Ok(())
+}

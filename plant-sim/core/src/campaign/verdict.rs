@@ -1,0 +1,76 @@
+//! What a case is held to, and what became of it.
+
+use std::collections::BTreeSet;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a run is held to.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize, Serialize, JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Requirement {
+    /// No stop where nothing is wrong, and none for what a sound system survives.
+    NoFalseAlarm,
+    /// Faults with a limit of time are detected within it.
+    Detected,
+    /// An axis off its reference, too fast or out of its range is reported at once.
+    Reported,
+    /// The first command after the report stops the arm, at most one sample later.
+    Reaction,
+    /// No motor is asked for more torque than it can give.
+    Torque,
+    /// Torque goes off in time.
+    Standstill,
+    /// The tool travels no further than a stop takes.
+    Distance,
+    /// Nothing drives the arm beyond its speed limits, or once torque is off.
+    Energy,
+    /// The lift goes down no further than it has to, and after a controlled stop not at all.
+    Drop,
+    /// A fault stays until it is acknowledged: nothing can be switched on.
+    Latch,
+    /// Nothing moves after the end of the run.
+    Still,
+}
+
+impl Requirement {
+    /// Its name, as results write it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoFalseAlarm => "no-false-alarm",
+            Self::Detected => "detected",
+            Self::Reported => "reported",
+            Self::Reaction => "reaction",
+            Self::Torque => "torque",
+            Self::Standstill => "standstill",
+            Self::Distance => "distance",
+            Self::Energy => "energy",
+            Self::Drop => "drop",
+            Self::Latch => "latch",
+            Self::Still => "still",
+        }
+    }
+}
+
+/// What became of a case.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+pub struct Verdict {
+    /// Requirements that it missed; none in a good case.
+    pub missed: BTreeSet<Requirement>,
+    /// Whether the scenario ran to its end in spite of the fault.
+    pub survived: bool,
+    /// What stopped it: a cause that the controller reported, or `drives` where they switched off by themselves.
+    pub detected: Option<String>,
+    /// From the beginning of the fault until it was detected, ms.
+    pub detection_ms: Option<f64>,
+    /// From the beginning of the fault until the arm stood still, ms.
+    pub standstill_ms: Option<f64>,
+    /// Way of the tool from the beginning of the fault until standstill, mm.
+    pub distance_mm: Option<f64>,
+    /// Greatest kinetic energy from the beginning of the fault until standstill, J.
+    pub energy_j: Option<f64>,
+    /// How far the lift went below its path, or below where it was when the fault was detected, mm.
+    pub drop_mm: Option<f64>,
+}
