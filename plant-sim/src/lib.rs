@@ -6,6 +6,7 @@
 //! ```text
 //! run                    one run into a folder: output (files that appear when complete)
 //! external, qemu         controllers in another process and on the emulated board, each beside a twin in this one (twin)
+//! campaign               many runs with faults: plans, shards, results
 //! crash                  planted faults of the board, and how they end
 //! check, replay, plot    a trace judged, repeated and drawn
 //! play, record, monitor  a trace sent to a bus, a bus recorded, and a bus watched
@@ -35,6 +36,7 @@
 // They panic where standard output or error is full or gone; `say!` and the sinks of results do not.
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
+pub mod campaign;
 mod chart;
 pub mod check;
 pub mod crash;

@@ -1,4 +1,4 @@
-//! The observer that reports the progress of a run.
+//! Progress of a run or a campaign on standard error.
 
 use std::io::{self, IsTerminal as _};
 use std::time::{Duration, Instant};
@@ -11,13 +11,18 @@ use crate::say;
 
 /// Runs that are over sooner need none.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Between two lines where there is no terminal.
+/// Between two lines of a run where there is no terminal.
 const PAUSE: Duration = Duration::from_secs(2);
+/// The same of a campaign, whose lines a log keeps.
+const LONG_PAUSE: Duration = Duration::from_secs(60);
 
-/// Reports the progress of a long run on standard error.
+/// Reports the progress of something long on standard error.
 pub struct Progress {
-    total: u32,
-    done: u32,
+    /// What is counted.
+    unit: &'static str,
+    pause: Duration,
+    total: u64,
+    done: u64,
     begun: Instant,
     /// When the last line was written, where there is no terminal.
     said: Instant,
@@ -27,8 +32,19 @@ pub struct Progress {
 impl Progress {
     /// At the start of a run of this many cycles.
     pub fn new(total: u32) -> Self {
+        Self::counting("cycle", PAUSE, total.into())
+    }
+
+    /// At the start of a campaign of this many cases.
+    pub fn of_cases(total: u64) -> Self {
+        Self::counting("case", LONG_PAUSE, total)
+    }
+
+    fn counting(unit: &'static str, pause: Duration, total: u64) -> Self {
         let now = Instant::now();
         Self {
+            unit,
+            pause,
             total,
             done: 0,
             begun: now,
@@ -37,29 +53,40 @@ impl Progress {
         }
     }
 
+    /// So many more are done.
+    pub fn add(&mut self, done: u64) {
+        self.done += done;
+        self.show();
+    }
+
     fn show(&mut self) {
         if self.begun.elapsed() < PATIENCE {
             return;
         }
         if io::stderr().is_terminal() {
-            let (total, begun) = (self.total, self.begun);
-            let bar = self.bar.get_or_insert_with(|| bar(total, begun));
-            bar.set_position(self.done.into());
-        } else if self.said.elapsed() >= PAUSE {
+            let (unit, total, begun) = (self.unit, self.total, self.begun);
+            let bar = self.bar.get_or_insert_with(|| bar(unit, total, begun));
+            bar.set_position(self.done);
+        } else if self.said.elapsed() >= self.pause {
             self.said = Instant::now();
-            let left = self.begun.elapsed().as_secs_f64() / f64::from(self.done)
-                * f64::from(self.total - self.done);
-            say!("cycle {} of {}, {left:.0} s left", self.done, self.total);
+            let left = self.begun.elapsed().as_secs_f64() / self.done as f64
+                * (self.total - self.done) as f64;
+            say!(
+                "{} {} of {}, {left:.0} s left",
+                self.unit,
+                self.done,
+                self.total
+            );
         }
     }
 }
 
-fn bar(total: u32, begun: Instant) -> ProgressBar {
-    let style =
-        ProgressStyle::with_template("{wide_bar} cycle {human_pos} of {human_len}, {eta} left")
-            .expect("the template is valid")
-            .progress_chars("=> ");
-    ProgressBar::with_draw_target(Some(total.into()), ProgressDrawTarget::stderr())
+fn bar(unit: &str, total: u64, begun: Instant) -> ProgressBar {
+    let template = format!("{{wide_bar}} {unit} {{human_pos}} of {{human_len}}, {{eta}} left");
+    let style = ProgressStyle::with_template(&template)
+        .expect("the template is valid")
+        .progress_chars("=> ");
+    ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr())
         .with_style(style)
         .with_elapsed(begun.elapsed())
 }
@@ -67,8 +94,7 @@ fn bar(total: u32, begun: Instant) -> ProgressBar {
 impl Observer for Progress {
     fn cell_event(&mut self, event: &CellEvent) {
         if matches!(event, CellEvent::EndCycle) {
-            self.done += 1;
-            self.show();
+            self.add(1);
         }
     }
 }

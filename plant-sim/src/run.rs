@@ -15,7 +15,7 @@ use sim::setup::{RunConfig, SetupError};
 use sim::summary::Summary;
 
 use crate::interrupt::Heeding;
-use crate::output::{Folder, OutputError};
+use crate::output::{File, Folder, OutputError};
 use crate::progress::Progress;
 
 /// Why a run has no results.
@@ -59,7 +59,6 @@ impl Results {
     }
 }
 
-/// Runs a scenario and writes `trace.log`, `truth.csv` and `summary.json` into `out`; each appears under its name
 const RESULTS: [&str; 5] = [
     "trace.log",
     "truth.csv",
@@ -68,7 +67,7 @@ const RESULTS: [&str; 5] = [
     "controller.log",
 ];
 
-/// once it is complete.
+/// The folder `out` for the results of a run.
 ///
 /// # Errors
 /// See [`Folder::open`].
@@ -122,6 +121,27 @@ pub fn execute_with<C: Peer, P: Pace, O: Observer>(
     pace: &mut P,
     observer: O,
 ) -> Result<Results, ExecuteError> {
+    record(config, recording, observer, |observers| {
+        with_controller(config, connect, &mut Heeding(pace), observers)
+    })
+}
+
+/// What records a run: trace, truth, progress, and one more observer.
+pub type Recorders<O> = (
+    Option<TraceLog<File>>,
+    (Option<TruthLog<File>>, (Option<Progress>, O)),
+);
+
+/// Records the run that `run` performs, as [`execute`] does.
+///
+/// # Errors
+/// Nothing was run, or nothing could be written; see [`ExecuteError`].
+pub fn record<O: Observer>(
+    config: &RunConfig,
+    recording: &Recording<'_>,
+    observer: O,
+    run: impl FnOnce(&mut Recorders<O>) -> Result<Summary, Failure>,
+) -> Result<Results, ExecuteError> {
     let folder = recording.folder;
     let failed = |source| folder.failed(source);
     // What cannot begin leaves older results alone.
@@ -136,16 +156,14 @@ pub fn execute_with<C: Peer, P: Pace, O: Observer>(
     let progress = recording
         .progress
         .then(|| Progress::new(config.scenario.cycles));
-    let mut observers = (trace, (truth, (progress, observer)));
+    let mut observers: Recorders<O> = (trace, (truth, (progress, observer)));
 
     let began = Instant::now();
-    let summary = with_controller(config, connect, &mut Heeding(pace), &mut observers).map_err(
-        |failure| match failure {
-            Failure::Setup(error) => ExecuteError::from(error),
-            Failure::Controller(error) => error.into(),
-            Failure::Output(source) => failed(source).into(),
-        },
-    )?;
+    let summary = run(&mut observers).map_err(|failure| match failure {
+        Failure::Setup(error) => ExecuteError::from(error),
+        Failure::Controller(error) => error.into(),
+        Failure::Output(source) => failed(source).into(),
+    })?;
     let wall_time_s = began.elapsed().as_secs_f64();
 
     let (trace, (truth, _)) = observers;

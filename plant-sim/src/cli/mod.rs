@@ -2,6 +2,7 @@
 
 mod arrival;
 mod bitrate;
+mod campaign;
 mod check;
 mod cost;
 mod crash;
@@ -48,6 +49,9 @@ enum Command {
     Run(run::RunArgs),
     /// Check a scenario without running it: what would be refused, how long it takes, what torque it needs.
     Check(check::CheckArgs),
+    /// Run many cases with a fault each, on one machine or on a cluster, and judge them.
+    #[command(subcommand)]
+    Campaign(campaign::CampaignCommand),
     /// Count the instructions and the stack that the controller takes on the emulated Cortex-M4F.
     Cost(cost::CostArgs),
     /// Plant faults into the controller on the emulated Cortex-M4F, and see how they end.
@@ -96,6 +100,7 @@ fn command(cli: Cli) -> Result<(), Failure> {
         None => run::run(&cli.run),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Check(args)) => check::run(&args),
+        Some(Command::Campaign(command)) => campaign::run(&command),
         Some(Command::Cost(args)) => cost::run(&args),
         Some(Command::Crash(args)) => crash::run(&args),
         Some(Command::Eval(args)) => eval::run(&args),

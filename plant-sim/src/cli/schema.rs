@@ -2,10 +2,12 @@
 
 use clap::{Args, ValueEnum};
 use firmware::mechanics::arm::ArmModel;
+use plant_sim::campaign::cases::Cases;
 use plant_sim::parameters::Row;
 use plant_sim::reference::{markdown, of_input, of_output};
 use plant_sim::run::Results;
 use schemars::{Schema, schema_for_value};
+use sim::campaign::tally::Outcome;
 use sim::model::RobotModel;
 use sim::model::file::{ModelFile, PayloadFile};
 use sim::rehearsal::Plan;
@@ -45,6 +47,10 @@ enum Name {
     Plan,
     /// cost --json.
     Cost,
+    /// A file of cases: campaign plan --cases (TOML; the schema is of the same keys and values in JSON).
+    CampaignCases,
+    /// A line of results of a campaign, but for the first: campaign run and merge.
+    CampaignResult,
     /// A robot as controller --model takes it: what plant-sim model prints.
     ControllerModel,
 }
@@ -60,6 +66,8 @@ impl Name {
             Self::Parameters => of_output::<Vec<Row>>(),
             Self::Plan => of_output::<Plan>(),
             Self::Cost => of_output::<Report>(),
+            Self::CampaignCases => of_input::<Cases>(),
+            Self::CampaignResult => of_output::<Outcome>(),
             // The controller's own type knows nothing of schemas: one of its values shows what it is.
             Self::ControllerModel => {
                 schema_for_value!(ArmModel::from(&RobotModel::irb_930_22_105()))

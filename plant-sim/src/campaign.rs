@@ -1,0 +1,73 @@
+//! Campaigns on disk: plans, results of shards, and what becomes of them.
+//!
+//! ```text
+//! cases     what to cross, as TOML                       plan      the cases, one a line, with their hash
+//! shard     which part of a plan, and its file           work      a shard, on every core
+//! merge     shards put together, in the order of cases   shrink    the smallest fault that still fails
+//! ```
+//!
+//! Everything streams: memory holds one batch of cases, however many there are. What a case comes to depends on the case alone,
+//! so results are the same bytes whatever the sharding and however often a shard was killed.
+
+pub mod cases;
+pub mod merge;
+pub mod plan;
+pub mod shard;
+pub mod shrink;
+pub mod work;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::output::OutputError;
+
+/// Why a command of a campaign cannot do its work.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read {
+        /// File.
+        path: PathBuf,
+        /// Reason.
+        source: io::Error,
+    },
+    /// The file is not what it should be.
+    #[error("{}: {what}", path.display())]
+    Wrong {
+        /// File.
+        path: PathBuf,
+        /// What is wrong, what is allowed, and what to do.
+        what: String,
+    },
+    /// Results cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// A case cannot be run.
+    #[error("case {case}: {what}")]
+    Case {
+        /// Its number.
+        case: u64,
+        /// Reason.
+        what: String,
+    },
+}
+
+impl CampaignError {
+    fn read(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_path_buf();
+        move |source| Self::Read { path, source }
+    }
+
+    fn wrong(path: &Path, what: impl Into<String>) -> Self {
+        Self::Wrong {
+            path: path.into(),
+            what: what.into(),
+        }
+    }
+
+    fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_path_buf();
+        move |source| Self::Output(OutputError::Write { path, source })
+    }
+}

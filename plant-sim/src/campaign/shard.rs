@@ -1,0 +1,308 @@
+//! A part of a plan, and the file of its results.
+//!
+//! The file is called `.partial` until it is complete. Results are appended a batch at a time: whatever ends the process leaves
+//! whole lines and at most a piece of one, which the next run cuts off.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, BufRead as _, BufReader, Read, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sim::campaign::tally::Outcome;
+
+use super::CampaignError;
+use super::plan::{self, Plan};
+use crate::output::OutputError;
+
+/// Part `part` of `of`, counted from 0: the cases whose number leaves this remainder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+pub struct Shard {
+    /// Which, from 0.
+    pub part: u64,
+    /// Of how many.
+    pub of: u64,
+}
+
+impl Shard {
+    /// The whole plan.
+    pub const WHOLE: Self = Self { part: 0, of: 1 };
+
+    /// Whether a case belongs to it.
+    pub fn has(self, case: u64) -> bool {
+        case % self.of == self.part
+    }
+
+    /// How many of `cases` belong to it.
+    pub fn share(self, cases: u64) -> u64 {
+        cases / self.of + u64::from(self.part < cases % self.of)
+    }
+
+    /// Name of the file of its results.
+    fn file(self) -> String {
+        format!("results-{}-of-{}.jsonl", self.part, self.of)
+    }
+}
+
+/// `K/N`.
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text
+            .split_once('/')
+            .and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
+        match numbers {
+            Some((part, of)) if part < of => Ok(Self { part, of }),
+            _ => Err("allowed: K/N with K from 0 to N-1, such as 0/4".into()),
+        }
+    }
+}
+
+/// The first line of a file of results.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+pub struct ShardHeader {
+    /// Hash of the plan.
+    pub plan: String,
+    /// Number of its cases.
+    pub cases: u64,
+    /// Build of the program: results of two builds are not those of one campaign.
+    pub build: String,
+    /// Which part of the plan is here.
+    pub shard: Shard,
+}
+
+impl ShardHeader {
+    /// For this part of a plan, by this program.
+    pub fn new(plan: &Plan, shard: Shard) -> Self {
+        let header = plan.header();
+        Self {
+            plan: header.plan.clone(),
+            cases: header.cases,
+            build: env!("COMMIT").into(),
+            shard,
+        }
+    }
+}
+
+/// Results of a shard on their way to disk.
+#[derive(Debug)]
+pub struct Results {
+    file: File,
+    partial: PathBuf,
+    path: PathBuf,
+}
+
+/// What a shard finds in its folder.
+#[derive(Debug)]
+pub enum Beginning {
+    /// All of its results.
+    Complete,
+    /// Results up to this case, or none, and room for more.
+    After(Option<u64>, Results),
+}
+
+impl Results {
+    /// The file of results in `folder`, which is created if missing. With `resume` the results there are kept, otherwise they
+    /// are replaced.
+    ///
+    /// # Errors
+    /// Another process writes them, they belong to another plan, or the folder does not accept them.
+    pub fn open(
+        folder: &Path,
+        header: &ShardHeader,
+        resume: bool,
+    ) -> Result<Beginning, CampaignError> {
+        fs::create_dir_all(folder).map_err(CampaignError::write(folder))?;
+        let path = folder.join(header.shard.file());
+        let partial = partial_of(&path);
+        if resume && path.exists() {
+            check(&path, header, &mut reader(&path)?)?;
+            return Ok(Beginning::Complete);
+        }
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&partial)
+            .map_err(CampaignError::write(&partial))?;
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err(OutputError::Locked {
+                path: folder.into(),
+            }
+            .into());
+        }
+        let (last, length) = if resume {
+            kept(&partial, header, &file)?
+        } else {
+            (None, 0)
+        };
+        let first = plan::line(header) + "\n";
+        file.set_len(length)
+            .and_then(|()| file.seek(SeekFrom::Start(length)))
+            .and_then(|_| match length {
+                0 => file.write_all(first.as_bytes()),
+                _ => Ok(()),
+            })
+            .map_err(CampaignError::write(&partial))?;
+        let results = Self {
+            file,
+            partial,
+            path,
+        };
+        Ok(Beginning::After(last, results))
+    }
+
+    /// Appends whole lines.
+    ///
+    /// # Errors
+    /// The disk is full, for example.
+    pub fn append(&mut self, lines: &str) -> Result<(), CampaignError> {
+        let written = self.file.write_all(lines.as_bytes());
+        written.map_err(CampaignError::write(&self.partial))
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn complete(self) -> Result<(), CampaignError> {
+        let done = self
+            .file
+            .sync_all()
+            .and_then(|()| fs::rename(&self.partial, &self.path));
+        done.map_err(CampaignError::write(&self.path))
+    }
+}
+
+fn partial_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".partial");
+    name.into()
+}
+
+/// The last case in an incomplete file, and the length of its whole lines.
+fn kept(
+    path: &Path,
+    header: &ShardHeader,
+    file: &File,
+) -> Result<(Option<u64>, u64), CampaignError> {
+    let mut reader = BufReader::new(file);
+    let mut line = String::new();
+    let (mut last, mut length) = (None, 0);
+    loop {
+        line.clear();
+        // What was cut short in the middle of a character is no line either.
+        let read = match reader.read_line(&mut line) {
+            Err(error) if error.kind() == io::ErrorKind::InvalidData => 0,
+            other => other.map_err(CampaignError::read(path))?,
+        };
+        if !line.ends_with('\n') || read == 0 {
+            return Ok((last, length));
+        }
+        if length == 0 {
+            same(path, header, &line)?;
+        } else {
+            last = Some(outcome(path, &line)?.case.case);
+        }
+        length += read as u64;
+    }
+}
+
+/// A line of results.
+///
+/// # Errors
+/// It is none.
+pub fn outcome(path: &Path, line: &str) -> Result<Outcome, CampaignError> {
+    serde_json::from_str(line).map_err(|error| {
+        CampaignError::wrong(path, format!("{error}: this is no result of a case"))
+    })
+}
+
+/// Reads the first line.
+///
+/// # Errors
+/// It cannot be read, or is not that of results.
+pub fn header(
+    path: &Path,
+    reader: &mut BufReader<impl Read>,
+) -> Result<ShardHeader, CampaignError> {
+    let mut line = String::new();
+    let read = reader.read_line(&mut line);
+    read.map_err(CampaignError::read(path))?;
+    parsed(path, &line)
+}
+
+/// Opens a file of results.
+///
+/// # Errors
+/// It cannot be read.
+pub fn reader(path: &Path) -> Result<BufReader<File>, CampaignError> {
+    File::open(path)
+        .map(BufReader::new)
+        .map_err(CampaignError::read(path))
+}
+
+fn check(
+    path: &Path,
+    expected: &ShardHeader,
+    reader: &mut BufReader<File>,
+) -> Result<(), CampaignError> {
+    let found = header(path, reader)?;
+    agree(path, expected, &found)
+}
+
+fn same(path: &Path, expected: &ShardHeader, line: &str) -> Result<(), CampaignError> {
+    agree(path, expected, &parsed(path, line)?)
+}
+
+fn parsed(path: &Path, line: &str) -> Result<ShardHeader, CampaignError> {
+    serde_json::from_str(line).map_err(|_| {
+        CampaignError::wrong(path, "the first line is not that of results of a campaign")
+    })
+}
+
+fn agree(path: &Path, expected: &ShardHeader, found: &ShardHeader) -> Result<(), CampaignError> {
+    if found == expected {
+        return Ok(());
+    }
+    let what = if found.build == expected.build {
+        "these are results of another plan"
+    } else {
+        "these are results of another build of this program"
+    };
+    Err(CampaignError::wrong(
+        path,
+        format!("{what}; choose another folder by --out, or leave out --resume to replace them"),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_share_every_case_once() {
+        for (cases, of) in [(0, 1), (1, 3), (10, 3), (12, 4), (5, 9)] {
+            let shards: Vec<_> = (0..of).map(|part| Shard { part, of }).collect();
+            for case in 0..cases {
+                let owners = shards.iter().filter(|shard| shard.has(case)).count();
+                assert_eq!(owners, 1, "{case}");
+            }
+            for shard in &shards {
+                let counted = (0..cases).filter(|case| shard.has(*case)).count();
+                assert_eq!(shard.share(cases), counted as u64);
+            }
+        }
+    }
+
+    #[test]
+    fn a_shard_is_counted_from_0() {
+        assert_eq!("0/1".parse(), Ok(Shard::WHOLE));
+        for wrong in ["1/1", "1", "a/2", "-1/2", "0/0", ""] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+}
