@@ -45,6 +45,13 @@ validate controller-model "$work/controller-model.json"
 "$plant_sim" check pick-place --json >"$work/plan.json"
 validate plan "$work/plan.json"
 
+echo "- cases and results of a campaign"
+validate campaign-cases plant-sim/campaigns/*.toml
+"$plant_sim" campaign plan --count 20 >"$work/campaign.jsonl"
+"$plant_sim" campaign run "$work/campaign.jsonl" --out "$work/campaign" 2>"$work/campaign.err" || [ $? = 1 ]
+tail -n +2 "$work"/campaign/results-0-of-1.jsonl | split -l 1 --additional-suffix .json - "$work/campaign/case-"
+validate campaign-result "$work"/campaign/case-*.json
+
 echo "- files that do not conform are found"
 sed 's/"mass": 11.5/"mass": -11.5/' plant-sim/models/irb930-22-1.05.json >"$work/wrong.json"
 refused 'links' validate model "$work/wrong.json"

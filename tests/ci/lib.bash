@@ -7,7 +7,7 @@
 #     check keeps a command quiet, it sends its standard error to $work/NAME.err, so that the report finds it;
 #   - ends the jobs it has started when it ends.
 #
-# need, need_python, need_browser, need_vcan and need_cross install what a check depends on (root on Debian) or say what is missing.
+# need, need_python, need_browser, need_vcan, need_slurm and need_cross install what a check depends on (root on Debian) or say what is missing.
 # build_host builds the project's programs; validate checks JSON and TOML against their schemas.
 
 set -Eeuo pipefail
@@ -127,6 +127,55 @@ need_vcan() { # what tests/with-vcan needs, and candump
     need insmod kmod
     ip link show vcan0 up 2>/dev/null | grep -q 'mtu 72' || ip link add dev vcan0 type vcan 2>/dev/null ||
         need linux.uml user-mode-linux
+}
+
+need_slurm() { # a Slurm of this check alone, with this machine as its only node
+    need slurmctld slurm-wlm
+    need munged munge
+    local slurm=$work/slurm-daemons
+    mkdir "$slurm"
+    head -c 1024 /dev/urandom >"$slurm/key"
+    chmod 700 "$slurm"
+    chmod 600 "$slurm/key"
+    export SLURM_CONF=$slurm/slurm.conf
+    # No systemd, no control groups, no accounting.
+    cat >"$SLURM_CONF" <<END
+ClusterName=check
+SlurmctldHost=localhost
+SlurmctldPort=16817
+SlurmdPort=16818
+SlurmUser=root
+AuthType=auth/munge
+AuthInfo=socket=$slurm/socket
+CredType=cred/munge
+StateSaveLocation=$slurm/state
+SlurmdSpoolDir=$slurm/spool
+SlurmctldPidFile=$slurm/slurmctld.pid
+SlurmdPidFile=$slurm/slurmd.pid
+ProctrackType=proctrack/pgid
+TaskPlugin=task/none
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+MpiDefault=none
+ReturnToService=2
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+NodeName=localhost CPUs=$(nproc) State=UNKNOWN
+PartitionName=all Nodes=localhost Default=YES State=UP
+END
+    munged --foreground --force --key-file="$slurm/key" --socket="$slurm/socket" --pid-file="$slurm/munged.pid" \
+        --log-file="$slurm/munged.log" --seed-file="$slurm/seed" >"$work/munged.err" 2>&1 &
+    eventually "the socket of munged" test -S "$slurm/socket"
+    slurmctld -D >"$work/slurmctld.err" 2>&1 &
+    slurm_daemons=$!
+    slurmd -D -N localhost >"$work/slurmd.err" 2>&1 &
+    slurm_daemons+=" $!"
+    eventually "an idle node" bash -c 'sinfo --noheader --format=%t 2>/dev/null | grep -q idle'
+}
+
+stop_slurm() { # before $work goes, into which it writes until its end
+    scontrol shutdown
+    wait $slurm_daemons || true
 }
 
 need_cross() { # need_cross TARGET: what tests/cross needs for it, clippy included

@@ -20,9 +20,11 @@ use protocol::messages::{
     Cause, Command, ControlWord, Emergency, Feedback, Message, Node, ResetReason,
 };
 use protocol::time::{Duration, Instant};
+use sim::campaign::bounds::Bounds;
 use sim::campaign::trial;
 use sim::campaign::verdict::{Requirement, Verdict};
 use sim::controller::InProcess;
+use sim::model::RobotModel;
 use sim::peer::{Outbox, Peer, PeerError};
 use sim::scenario::{PayloadSpec, Scenario};
 use sim::setup::RunConfig;
@@ -311,4 +313,25 @@ fn a_verdict_gives_the_consequence() {
     let survived = judge("feedback:loss@0.45s..0.452s", 2.0, None);
     assert!(survived.survived && survived.detected.is_none());
     assert_eq!(survived.distance_mm, None);
+}
+
+/// Worked out by hand for 22 kg, from rest: 23.95 kg and 8.21 kg of rotor, 860 N and 235 N of weight. 8 ms at 34.0 m/s2 are 1.1 mm
+/// and 0.27 m/s; 30 ms of free fall from there 12.6 mm and 0.57 m/s; to stop that at 19.4 m/s2 takes 8.3 mm. From 1 m/s:
+/// 9.1 mm, 42.6 mm and 63.1 mm. A stop of the shoulder takes twice (7.68 / 60 + 60 / 2500) s.
+#[test]
+fn bounds_are_those_worked_out_by_hand() {
+    let mut bounds = Bounds::new(&RobotModel::irb_930_22_105(), 1e-3);
+    bounds.carry(&PayloadSpec::compact(22.0).into());
+    assert!(
+        (bounds.drop(0.0) - 0.0220).abs() < 1e-4,
+        "{}",
+        bounds.drop(0.0)
+    );
+    assert!(
+        (bounds.drop(1.0) - 0.1148).abs() < 3e-4,
+        "{}",
+        bounds.drop(1.0)
+    );
+    assert!((bounds.stop_s() - 0.304).abs() < 1e-3);
+    assert!((bounds.torque_off_s() - 0.372).abs() < 1e-3);
 }
