@@ -16,8 +16,8 @@ use common::{U, assert_close, irb_930_short, position, speed};
 use firmware::mechanics::arm::{ArmModel, Axis, IRB_930};
 use firmware::mechanics::jacobian::Jacobian;
 use firmware::mechanics::kinematics::{
-    Elbow, IkError, LIMIT_TOLERANCE, Pose, REACH_TOLERANCE, Trig, forward, inverse, link_frames,
-    rotation, solve,
+    Elbow, IkError, LIMIT_TOLERANCE, Pose, REACH_TOLERANCE, Trig, Wrist, forward, inverse,
+    link_frames, locate, rotation, solve,
 };
 use firmware::mechanics::velocity::propagate;
 use nalgebra::{Matrix3, Vector3, Vector4};
@@ -151,6 +151,32 @@ proptest! {
             if other > f64::from(lower) + slack && other < f64::from(upper) - slack {
                 prop_assert!((other - f64::from(near)).abs() >= gap - 40.0 * U, "{other} is nearer to {near} than {}", found.w);
             }
+        }
+    }
+
+    /// The wrist is in the turn asked for, or past its limit by that turn.
+    #[test]
+    fn wrist_takes_the_turn_asked_for(q in position(), turn in -3i8..=3) {
+        // Close to the stretched arm the shoulder may exceed its limit by more than the tolerance.
+        let mut q = q;
+        if q.y.abs() < 0.5 {
+            q.y += 1.0;
+        }
+        let pose = forward(&IRB_930.geometry, &q);
+        let turns = TAU * f64::from(turn);
+        // Half a revolution away, to within rounding, either turn is right.
+        let own = f64::from(q.w) - TAU * (f64::from(q.w) / TAU).round();
+        let slack = 100.0 * U;
+        prop_assume!(own.abs() < std::f64::consts::PI - slack);
+        let expected = own + turns;
+        let (lower, upper) = (f64::from(IRB_930.limits.lower.w), f64::from(IRB_930.limits.upper.w));
+        match locate(&IRB_930, &pose, Elbow::of(&q), Wrist::Turn(turn)) {
+            Ok(found) => prop_assert!((f64::from(found.w) - expected).abs() < slack, "{found} {expected}"),
+            Err(IkError::Limit { axis: Axis::Wrist, value, .. }) => {
+                prop_assert!((f64::from(value) - expected).abs() < slack, "{value} {expected}");
+                prop_assert!(expected < lower + slack || expected > upper - slack, "{expected}");
+            }
+            Err(other) => prop_assert!(false, "{other}"),
         }
     }
 

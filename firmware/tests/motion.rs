@@ -19,7 +19,7 @@ use firmware::trajectory::request::{Request, Target};
 use firmware::trajectory::torque_budget::TorqueBudget;
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
-use protocol::messages::{Refusal, RefusalReason};
+use protocol::messages::{ElbowSide, Posture, Refusal, RefusalReason, WristTurn};
 
 const GATE_A: Pose = Pose {
     x: 0.493_934,
@@ -164,7 +164,7 @@ proptest! {
         let from = kinematics::inverse(&IRB_930, &pose(r0, a0), kinematics::Elbow::Positive, &Vector4::zeros());
         let Ok(from) = from else { return Ok(()) };
         let top = -0.3 + rise;
-        let target = Target::Jump { pose: pose(r1, a1), top, clearance };
+        let target = Target::Jump { pose: pose(r1, a1), posture: Posture::NEAREST, top, clearance };
         let Ok(trajectory) = plan(&IRB_930, &payload, &from, target, 1.0) else { return Ok(()) };
         check(&IRB_930, &payload, &trajectory)?;
         // The gate: while the tool is within the clearance above one of its ends, it is vertically above it.
@@ -202,7 +202,7 @@ proptest! {
         let Ok(from) = kinematics::inverse(&IRB_930, &start, kinematics::Elbow::Positive, &Vector4::zeros())
         else { return Ok(()) };
         let to = |clearance| {
-            plan(&IRB_930, &payload, &from, Target::Jump { pose: end, top, clearance }, speed)
+            plan(&IRB_930, &payload, &from, Target::Jump { pose: end, posture: Posture::NEAREST, top, clearance }, speed)
         };
         let Ok(trajectory) = to(0.0) else { return Ok(()) };
         check(&IRB_930, &payload, &trajectory)?;
@@ -223,6 +223,55 @@ proptest! {
         );
     }
 
+    /// A jump ends at its pose, with the elbow at the side and the wrist in the turn that were asked for, or names the axis
+    /// that cannot.
+    #[test]
+    fn jumps_end_in_the_posture_asked_for(
+        from in joints(), to in joints(), rise in 0.0f32..0.1,
+        elbow in prop::sample::select(ElbowSide::ALL), turn in prop::sample::select(WristTurn::ALL),
+    ) {
+        // A stretched or folded arm has one posture, and f32 knows its elbow badly.
+        prop_assume!(to.y.abs() > 0.1 && from.y.abs() > 1e-3);
+        let pose = kinematics::forward(&IRB_930.geometry, &to);
+        let top = pose.z + rise;
+        let target = Target::Jump { pose, posture: Posture { elbow, turn }, top, clearance: 0.0 };
+        match plan(&IRB_930, &two_kg(), &from, target, 1.0) {
+            Ok(trajectory) => {
+                check(&IRB_930, &two_kg(), &trajectory)?;
+                let end = trajectory.end;
+                let positive = match elbow {
+                    ElbowSide::Keep => from.y > 0.0,
+                    ElbowSide::Positive => true,
+                    ElbowSide::Negative => false,
+                };
+                prop_assert_eq!(end.y > 0.0, positive);
+                if let Some(turn) = turn.number() {
+                    let revolutions = end.w / std::f32::consts::TAU;
+                    prop_assert!((revolutions - f32::from(turn)).abs() < 0.5 + 1e-5, "{revolutions} {turn}");
+                }
+                let there = kinematics::forward(&IRB_930.geometry, &end);
+                let off = (there.x - pose.x).hypot(there.y - pose.y).max((there.z - pose.z).abs());
+                prop_assert!(off < 1e-5, "{there:?} {pose:?}");
+                let turned = firmware::mechanics::math::wrap(there.yaw - pose.yaw);
+                prop_assert!(turned.abs() < 1e-4, "{there:?} {pose:?}");
+            }
+            Err(refusal) => {
+                let own = (to.y > 0.0, (to.w / std::f32::consts::TAU).round());
+                let same = match elbow {
+                    ElbowSide::Keep => from.y > 0.0,
+                    side => side == ElbowSide::Positive,
+                } == own.0;
+                let turn = turn.number().map(f32::from);
+                // The arm was there: at its side and in its turn only the heights can be in the way.
+                prop_assert!(
+                    !same || turn.is_some_and(|turn| turn != own.1) || refusal.axis == 2
+                        || refusal.reason == RefusalReason::TorqueTooSmall,
+                    "{refusal:?}"
+                );
+            }
+        }
+    }
+
     #[test]
     fn lines_are_straight_and_keep_every_limit(
         x0 in 0.4f32..0.8, y0 in -0.3f32..0.3, x1 in 0.4f32..0.8, y1 in -0.3f32..0.3,
@@ -231,7 +280,7 @@ proptest! {
         let start = Pose { x: x0, y: y0, z: -0.2, yaw: 0.0 };
         let end = Pose { x: x1, y: y1, z: z1, yaw };
         let from = kinematics::inverse(&IRB_930, &start, kinematics::Elbow::Positive, &Vector4::zeros()).unwrap();
-        let Ok(trajectory) = plan(&IRB_930, &two_kg(), &from, Target::Line(end), 1.0) else { return Ok(()) };
+        let Ok(trajectory) = plan(&IRB_930, &two_kg(), &from, Target::Line(end, Posture::NEAREST), 1.0) else { return Ok(()) };
         check(&IRB_930, &two_kg(), &trajectory)?;
         let along = Vector3::new(x1 - x0, y1 - y0, z1 + 0.2);
         for i in 0..=200 {
@@ -247,6 +296,39 @@ proptest! {
     }
 }
 
+/// A line keeps the side of its elbow, and turns the yaw as far as the turn of the wrist at its end wants.
+#[test]
+fn a_line_ends_in_the_turn_asked_for_and_at_its_side() {
+    let from = Vector4::new(-0.4, 1.2, 0.1, 0.5);
+    let end = Pose {
+        x: 0.7,
+        y: 0.2,
+        z: -0.25,
+        yaw: 1.0,
+    };
+    let line = |elbow, turn| {
+        let target = Target::Line(end, Posture { elbow, turn });
+        plan(&IRB_930, &two_kg(), &from, target, 1.0)
+    };
+    let plain = line(ElbowSide::Keep, WristTurn::Nearest).unwrap().end;
+    for (turn, number) in [
+        (WristTurn::Zero, 0.0),
+        (WristTurn::PlusOne, 1.0),
+        (WristTurn::MinusOne, -1.0),
+    ] {
+        let trajectory = line(ElbowSide::Positive, turn).unwrap();
+        check(&IRB_930, &two_kg(), &trajectory).unwrap();
+        let turned = trajectory.end.w - plain.w;
+        assert!((turned - number * std::f32::consts::TAU).abs() < 1e-5);
+        assert!((trajectory.end - plain).xyz().amax() < 1e-5);
+    }
+    let far = line(ElbowSide::Keep, WristTurn::PlusTwo).unwrap_err();
+    assert_eq!((far.reason, far.axis), (RefusalReason::JointLimit, 3));
+    assert!(far.value > far.limit, "{far:?}");
+    let other = line(ElbowSide::Negative, WristTurn::Nearest).unwrap_err();
+    assert_eq!(other.reason, RefusalReason::ElbowSide);
+}
+
 /// Analytic derivatives of a line against differences of its positions.
 #[test]
 fn derivatives_of_a_line_belong_to_its_positions() {
@@ -257,11 +339,14 @@ fn derivatives_of_a_line_belong_to_its_positions() {
         &Vector4::zeros(),
     )
     .unwrap();
-    let target = Target::Line(Pose {
-        yaw: 1.0,
-        z: -0.2,
-        ..GATE_B
-    });
+    let target = Target::Line(
+        Pose {
+            yaw: 1.0,
+            z: -0.2,
+            ..GATE_B
+        },
+        Posture::NEAREST,
+    );
     let trajectory = plan(&IRB_930, &two_kg(), &from, target, 0.5).unwrap();
     let h = 1e-3;
     for i in 1..100 {
@@ -287,12 +372,14 @@ fn the_gate_fills_the_torque_of_three_axes() {
     .unwrap();
     let target = Target::Jump {
         pose: GATE_B,
+        posture: Posture::NEAREST,
         top: -0.2463,
         clearance: 0.005,
     };
     let there = plan(&IRB_930, &two_kg(), &from, target, 1.0).unwrap();
     let back = Target::Jump {
         pose: GATE_A,
+        posture: Posture::NEAREST,
         top: -0.2463,
         clearance: 0.005,
     };
@@ -322,12 +409,15 @@ fn the_gate_fills_the_torque_of_three_axes() {
 fn refusals_name_axis_value_and_limit() {
     let home = Vector4::new(0.0, 1.5, 0.15, 0.0);
     let refuse = |target| plan(&IRB_930, &two_kg(), &home, target, 1.0).unwrap_err();
-    let far = refuse(Target::Line(Pose {
-        x: 2.0,
-        y: 0.0,
-        z: -0.2,
-        yaw: 0.0,
-    }));
+    let far = refuse(Target::Line(
+        Pose {
+            x: 2.0,
+            y: 0.0,
+            z: -0.2,
+            yaw: 0.0,
+        },
+        Posture::NEAREST,
+    ));
     assert_eq!(far.reason, RefusalReason::TooFar);
     assert_eq!((far.value, far.limit), (2.0, IRB_930.geometry.reach()));
     let limit = refuse(Target::Joints(Vector4::new(0.0, 3.0, 0.1, 0.0)));
@@ -337,12 +427,14 @@ fn refusals_name_axis_value_and_limit() {
     );
     let low = refuse(Target::Jump {
         pose: GATE_B,
+        posture: Posture::NEAREST,
         top: 1.0,
         clearance: 0.0,
     });
     assert_eq!((low.reason, low.axis), (RefusalReason::JointLimit, 2));
     let below = refuse(Target::Jump {
         pose: GATE_B,
+        posture: Posture::NEAREST,
         top: -0.3,
         clearance: 0.0,
     });
@@ -352,17 +444,23 @@ fn refusals_name_axis_value_and_limit() {
     // Through the stretched arm: both ends are fine, but the path is not.
     let bent = Vector4::new(-0.4, 0.4, 0.1, 0.0);
     let start = kinematics::forward(&IRB_930.geometry, &bent);
-    let across = Target::Line(Pose {
-        y: -start.y - 0.2,
-        x: start.x - 0.3,
-        ..start
-    });
-    let beyond = Target::Line(Pose {
-        x: 1.0499,
-        y: 0.0,
-        z: start.z,
-        yaw: 0.0,
-    });
+    let across = Target::Line(
+        Pose {
+            y: -start.y - 0.2,
+            x: start.x - 0.3,
+            ..start
+        },
+        Posture::NEAREST,
+    );
+    let beyond = Target::Line(
+        Pose {
+            x: 1.0499,
+            y: 0.0,
+            z: start.z,
+            yaw: 0.0,
+        },
+        Posture::NEAREST,
+    );
     let singular = plan(&IRB_930, &two_kg(), &bent, beyond, 1.0).unwrap_err();
     assert_eq!(singular.reason, RefusalReason::Singular);
     assert!(singular.value < singular.limit);

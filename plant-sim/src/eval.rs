@@ -30,6 +30,24 @@ pub enum Table {
     Actuation,
 }
 
+/// Side to which the elbow bends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Elbow {
+    /// theta2 >= 0, as a right arm bends: the solution a
+    Positive,
+    /// theta2 <= 0, as a left arm bends: the solution b
+    Negative,
+}
+
+/// Which of the joint positions of a pose are meant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Posture {
+    /// The solution that has to be within the limits; otherwise the better one.
+    pub elbow: Option<Elbow>,
+    /// Whole revolutions of theta4, 0 from -pi to pi; otherwise 0, judged by whether any is within the limits.
+    pub turn: Option<i8>,
+}
+
 /// Which implementation computes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum By {
@@ -107,12 +125,13 @@ pub enum EvalError {
 }
 
 /// Reads rows of the input columns of `table` and writes for each its result columns as computed `by` one
-/// implementation, preceded by the labels (`id`, `kind`, `payload`) in the input.
+/// implementation, preceded by the labels (`id`, `kind`, `payload`) in the input. `posture` is for [`Table::Ik`].
 ///
 /// Numbers are printed as the shortest decimals that read back as the same number, `nan` where there is no
 /// result.
 pub fn eval(
     table: Table,
+    posture: Posture,
     by: By,
     model: &RobotModel,
     payload: Option<&Payload>,
@@ -155,7 +174,7 @@ pub fn eval(
         let four = |i: usize| Vector4::from_column_slice(&values[4 * i..4 * i + 4]);
         let results = match table {
             Table::Kinematics => side.kinematics(&four(0), &four(1)),
-            Table::Ik => side.ik(&four(0)),
+            Table::Ik => side.ik(&four(0), posture),
             Table::Dynamics => side.dynamics(&four(0), &four(1), &four(2)),
             Table::Actuation => side.actuation(&four(0), &four(1), &four(2)),
         };
@@ -192,7 +211,7 @@ trait Side {
     fn largest(&self) -> f64;
     fn kinematics(&self, q: &Vector4<f64>, qd: &Vector4<f64>) -> Vec<Cell>;
     /// `pose` is x, y, z, yaw.
-    fn ik(&self, pose: &Vector4<f64>) -> Vec<Cell>;
+    fn ik(&self, pose: &Vector4<f64>, posture: Posture) -> Vec<Cell>;
     fn dynamics(&self, q: &Vector4<f64>, qd: &Vector4<f64>, qdd: &Vector4<f64>) -> Vec<Cell>;
     fn actuation(&self, q: &Vector4<f64>, qd: &Vector4<f64>, qdd: &Vector4<f64>) -> Vec<Cell>;
 }

@@ -8,13 +8,18 @@
     reason = "a test fails by panicking"
 )]
 
-use plant_sim::eval::{By, Table, eval};
+use plant_sim::eval::{By, Elbow, Posture, Table, eval};
 use sim::model::RobotModel;
 
 fn run(table: Table, by: By, input: &str) -> Result<String, String> {
+    run_in(table, Posture::default(), by, input)
+}
+
+fn run_in(table: Table, posture: Posture, by: By, input: &str) -> Result<String, String> {
     let mut output = Vec::new();
     eval(
         table,
+        posture,
         by,
         &RobotModel::irb_930_22_105(),
         None,
@@ -152,6 +157,7 @@ fn the_controller_may_refuse_a_model_that_the_plant_takes() {
     model.gravity = -9.81;
     let message = eval(
         Table::Ik,
+        Posture::default(),
         By::Lagrange,
         &model,
         None,
@@ -188,4 +194,33 @@ fn the_easier_solution_decides_the_reason() {
     assert_eq!(row(0.8, 0.3, -0.5), ["z_low", "0", "0"]);
     assert_eq!(row(0.15, 0.1, -0.2), ["joint2_limit", "0", "0"]);
     assert_eq!(row(0.05, 0.0, -0.2), ["inside_hole", "0", "0"]);
+}
+
+#[test]
+fn the_elbow_asked_for_decides_the_reason_and_the_turn_is_added_to_the_wrist() {
+    let row = |elbow, turn, by, pose: &str| -> Vec<String> {
+        let input = format!("x,y,z,yaw\n{pose}\n");
+        let output = run_in(Table::Ik, Posture { elbow, turn }, by, &input).unwrap();
+        let cells = output.lines().nth(1).unwrap().split(',');
+        cells.map(str::to_owned).collect()
+    };
+    for by in [By::Plant, By::Lagrange] {
+        // Behind the base on the right: only the left arm reaches it.
+        let reason = |elbow| row(elbow, None, by, "-0.6,-0.75,-0.2,0")[0].clone();
+        assert_eq!(reason(None), "ok");
+        assert_eq!(reason(Some(Elbow::Negative)), "ok");
+        assert_eq!(reason(Some(Elbow::Positive)), "joint1_limit");
+
+        let wrist = |turn| row(None, turn, by, "0.5,0.1,-0.2,0");
+        let (plain, next) = (wrist(None), wrist(Some(1)));
+        for column in [4, 9] {
+            let number = |row: &[String]| row[column].parse::<f64>().unwrap();
+            let turned = number(&next) - number(&plain);
+            assert!((turned - std::f64::consts::TAU).abs() < 1e-6, "{turned}");
+        }
+        // The wrist turns by 400 degrees either way.
+        assert_eq!(plain[0], "ok");
+        assert_eq!(wrist(Some(0)), plain);
+        assert_eq!(wrist(Some(2))[0], "joint4_limit");
+    }
 }

@@ -195,11 +195,14 @@ const fn info_of(message: &Message) -> &'static MessageInfo {
     }
 }
 
+// Out of line: reading writes as well, and would carry a copy of it.
+#[inline(never)]
+fn put<T: Serialize>(value: &T, body: &mut [u8]) -> Option<()> {
+    postcard::to_slice(value, body).ok().map(|_| ())
+}
+
 /// Writes the message to the beginning of `body`; `None` if it does not fit.
 fn write(message: &Message, body: &mut [u8]) -> Option<()> {
-    fn put<T: Serialize>(value: &T, body: &mut [u8]) -> Option<()> {
-        postcard::to_slice(value, body).ok().map(|_| ())
-    }
     fn pack<const LEN: usize, T: Packed<LEN>>(value: &T, body: &mut [u8]) -> Option<()> {
         value.pack(body.first_chunk_mut()?)
     }
@@ -246,7 +249,7 @@ fn take<T: Serialize + DeserializeOwned>(body: &[u8]) -> Result<T, DecodeError> 
     let (message, _) = postcard::take_from_bytes(body).map_err(|_| DecodeError::Malformed)?;
     // Postcard's output followed by zeros is the one body this message has.
     let mut canonical = [0; FD_MAX];
-    postcard::to_slice(&message, &mut canonical).map_err(|_| DecodeError::Malformed)?;
+    put(&message, &mut canonical).ok_or(DecodeError::Malformed)?;
     if !canonical.starts_with(body) {
         return Err(DecodeError::NotCanonical);
     }

@@ -1,9 +1,9 @@
 //! The fields of every message, byte by byte, as the [`table`](crate::table) lists them.
 
 use crate::messages::{
-    Cause, Compensation, ControlWord, DriveStatus, FaultAxis, Law, LimitFlags, Mode, MotionRequest,
-    NmtCommand, Outcome, ParameterError, ParameterReply, ParameterRequest, RefusalReason,
-    ResetReason,
+    Cause, Compensation, ControlWord, DriveStatus, ElbowSide, FaultAxis, Law, LimitFlags, Mode,
+    MotionRequest, NmtCommand, Outcome, ParameterError, ParameterReply, ParameterRequest,
+    RefusalReason, ResetReason, WristTurn,
 };
 use crate::schema::{Kind, Signal};
 
@@ -41,6 +41,8 @@ const ANY: Kind = range(f32::MIN, f32::MAX);
 const COORDINATE: Kind = range(-100.0, 100.0);
 const FRACTION: Kind = range(0.0, 1.0);
 const CAUSE: Kind = Kind::Code(Cause::CODES);
+const ELBOW: Kind = Kind::Code(ElbowSide::CODES);
+const TURN: Kind = Kind::Code(WristTurn::CODES);
 const MODE: Kind = Kind::Code(Mode::CODES);
 
 const fn range(min: f32, max: f32) -> Kind {
@@ -120,10 +122,14 @@ pub(crate) const MOTION: &[Signal] = &[
     when(4, "joint_speed", 18, FRACTION, one!("")),
     when(5, "line_target", 2, COORDINATE, POSE),
     when(5, "line_speed", 18, FRACTION, one!("")),
+    when(5, "line_elbow", 22, ELBOW, one!("")),
+    when(5, "line_turn", 23, TURN, one!("")),
     when(6, "jump_target", 2, COORDINATE, POSE),
     when(6, "jump_top", 18, COORDINATE, one!("m")),
     when(6, "jump_clearance", 22, range(0.0, 1.0), one!("m")),
     when(6, "jump_speed", 26, FRACTION, one!("")),
+    when(6, "jump_elbow", 30, ELBOW, one!("")),
+    when(6, "jump_turn", 31, TURN, one!("")),
     when(7, "payload_mass", 2, range(0.0, 100.0), one!("kg")),
     when(
         7,

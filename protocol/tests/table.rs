@@ -99,22 +99,31 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                     many("joint_target", target),
                     one("joint_speed", speed),
                 ],
-                MotionRequest::MoveLine { target, speed } => vec![
+                MotionRequest::MoveLine {
+                    target,
+                    speed,
+                    posture,
+                } => vec![
                     one("request", 5),
                     many("line_target", target),
                     one("line_speed", speed),
+                    one("line_elbow", posture.elbow.code()),
+                    one("line_turn", posture.turn.code()),
                 ],
                 MotionRequest::Jump {
                     target,
                     top,
                     clearance,
                     speed,
+                    posture,
                 } => vec![
                     one("request", 6),
                     many("jump_target", target),
                     one("jump_top", top),
                     one("jump_clearance", clearance),
                     one("jump_speed", speed),
+                    one("jump_elbow", posture.elbow.code()),
+                    one("jump_turn", posture.turn.code()),
                 ],
                 MotionRequest::SetPayload { mass, com, inertia } => vec![
                     one("request", 7),

@@ -8,7 +8,7 @@
     reason = "a test fails by panicking"
 )]
 
-use plant_sim::eval::{By, Table, eval};
+use plant_sim::eval::{By, Posture, Table, eval};
 use sim::model::{Payload, RobotModel};
 use tests::reference;
 
@@ -66,6 +66,7 @@ fn agrees(what: Table, by: By, input: &[u8], payload: Option<&Payload>) {
     let mut output = Vec::new();
     eval(
         what,
+        Posture::default(),
         by,
         &RobotModel::irb_930_22_105(),
         payload,

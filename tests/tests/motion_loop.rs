@@ -10,7 +10,7 @@ use std::io;
 
 use sim::observer::{Observer, Truth};
 use sim::run::in_process;
-use sim::scenario::{Jump, Line, PayloadSpec, Scenario, Step};
+use sim::scenario::{Joints, Jump, PayloadSpec, Scenario, Step};
 use sim::setup::RunConfig;
 use sim::summary::Summary;
 
@@ -45,6 +45,8 @@ fn scenario(start: [f64; 4], kg: f64, cycle: Vec<Step>) -> Scenario {
 fn jump(to: [f64; 4], top: f64) -> Step {
     Step::Jump(Jump {
         to,
+        elbow: None,
+        turn: None,
         top,
         clearance: 0.0,
         speed: 1.0,
@@ -52,7 +54,7 @@ fn jump(to: [f64; 4], top: f64) -> Step {
 }
 
 fn joints(to: [f64; 4]) -> Step {
-    Step::Joints(Line { to, speed: 1.0 })
+    Step::Joints(Joints { to, speed: 1.0 })
 }
 
 /// Runs without a fault; the error of the tool stays below `limit_mm`, and no motor is at its limit for longer than the

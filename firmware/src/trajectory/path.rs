@@ -2,7 +2,7 @@
 
 use nalgebra::Vector4;
 
-use crate::mechanics::arm::{ArmModel, Axis};
+use crate::mechanics::arm::ArmModel;
 use crate::mechanics::jacobian::Jacobian;
 use crate::mechanics::kinematics::{self, Elbow, IkError, Pose, Trig};
 
@@ -104,7 +104,7 @@ impl Path {
 ///
 /// # Errors
 /// [`IkError::Limit`] with the axis, the value and the limit passed.
-// Out of line: asked for in several places.
+// Out of line: asked for at every point of a path.
 #[inline(never)]
 pub fn check_limits(
     arm: &ArmModel,
@@ -114,19 +114,5 @@ pub fn check_limits(
     let limits = &arm.limits;
     let lower = from.map_or(limits.lower, |from| limits.lower.inf(from));
     let upper = from.map_or(limits.upper, |from| limits.upper.sup(from));
-    for axis in Axis::ALL {
-        let value = axis.of(q);
-        if !value.is_finite() {
-            return Err(IkError::NotFinite);
-        }
-        let limit = if value < axis.of(&lower) {
-            axis.of(&limits.lower)
-        } else if value > axis.of(&upper) {
-            axis.of(&limits.upper)
-        } else {
-            continue;
-        };
-        return Err(IkError::Limit { axis, value, limit });
-    }
-    Ok(())
+    kinematics::check_range(q, &lower, &upper, limits)
 }

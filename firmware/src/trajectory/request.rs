@@ -1,11 +1,11 @@
 //! A requested move, and its path.
 
 use nalgebra::Vector4;
-use protocol::messages::{Refusal, RefusalReason};
+use protocol::messages::{ElbowSide, Posture, Refusal, RefusalReason, WristTurn};
 
 use super::path::{MIN_SIN_ELBOW, Path, PathError, check_limits};
 use crate::mechanics::arm::{ArmModel, Axis};
-use crate::mechanics::kinematics::{self, Elbow, IkError, Pose};
+use crate::mechanics::kinematics::{self, Elbow, IkError, Pose, Wrist};
 use crate::mechanics::math::wrap;
 
 /// What to move to. Lengths in m in frame 0 (z up), angles in rad.
@@ -14,11 +14,13 @@ pub enum Target {
     /// Straight in joint space to these joint positions.
     Joints(Vector4<f32>),
     /// Straight line of the tool.
-    Line(Pose),
+    Line(Pose, Posture),
     /// Gate move: up, across (straight in joint space), down.
     Jump {
         /// Tool pose at the end.
         pose: Pose,
+        /// Which joint positions there.
+        posture: Posture,
         /// Height of the tool at the top.
         top: f32,
         /// Height of the strictly vertical part at both ends; above it the corners are blended.
@@ -68,13 +70,14 @@ impl Target {
                 check_limits(arm, q, None).map_err(from_ik)?;
                 Ok((straight(from, q), None))
             }
-            Self::Line(pose) => Ok((line(arm, from, pose)?, None)),
+            Self::Line(pose, posture) => Ok((line(arm, from, pose, *posture)?, None)),
             Self::Jump {
                 pose,
+                posture,
                 top,
                 clearance,
             } => {
-                let q = kinematics::inverse(arm, pose, Elbow::of(from), from).map_err(from_ik)?;
+                let q = joints_of(arm, pose, *posture, from)?;
                 let gate = gate(arm, from, &q, *top, *clearance)?;
                 let mut across = q;
                 across.z = from.z;
@@ -91,18 +94,43 @@ fn straight(from: &Vector4<f32>, to: &Vector4<f32>) -> Path {
     }
 }
 
-fn line(arm: &ArmModel, from: &Vector4<f32>, to: &Pose) -> Result<Path, Refusal> {
+/// The joint positions that are meant by a pose, for an arm that comes from `from`.
+#[inline(never)]
+fn joints_of(
+    arm: &ArmModel,
+    pose: &Pose,
+    posture: Posture,
+    from: &Vector4<f32>,
+) -> Result<Vector4<f32>, Refusal> {
+    let elbow = match posture.elbow {
+        ElbowSide::Keep => Elbow::of(from),
+        ElbowSide::Positive => Elbow::Positive,
+        ElbowSide::Negative => Elbow::Negative,
+    };
+    let wrist = match posture.turn.number() {
+        None => Wrist::Near(from.w),
+        Some(turn) => Wrist::Turn(turn),
+    };
+    kinematics::locate(arm, pose, elbow, wrist).map_err(from_ik)
+}
+
+fn line(arm: &ArmModel, from: &Vector4<f32>, to: &Pose, posture: Posture) -> Result<Path, Refusal> {
     let elbow = Elbow::of(from);
-    kinematics::inverse(arm, to, elbow, from).map_err(from_ik)?;
+    let end = joints_of(arm, to, posture, from)?;
+    // Stretched it is at both sides, and no line can begin there anyway.
+    if Elbow::of(&end) != elbow && end.y != 0.0 {
+        return Err(Refusal::because(RefusalReason::ElbowSide));
+    }
     let start = kinematics::forward(&arm.geometry, from);
+    let yaw = |q: &Vector4<f32>| q.x + q.y - q.w;
+    let turned = if posture.turn == WristTurn::Nearest {
+        wrap(to.yaw - start.yaw)
+    } else {
+        yaw(&end) - yaw(from)
+    };
     Ok(Path::Line {
         start,
-        delta: Vector4::new(
-            to.x - start.x,
-            to.y - start.y,
-            to.z - start.z,
-            wrap(to.yaw - start.yaw),
-        ),
+        delta: Vector4::new(to.x - start.x, to.y - start.y, to.z - start.z, turned),
         elbow,
         wrist_turns: from.w - (from.x + from.y - start.yaw),
     })

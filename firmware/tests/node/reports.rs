@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use protocol::codec::encode;
 use protocol::frame::{CanFrame, StandardId};
 use protocol::messages::{
-    Message, Mode, MotionRequest, Nmt, NmtCommand, Node as Name, ResetReason, State,
+    Message, Mode, MotionRequest, Nmt, NmtCommand, Node as Name, Posture, ResetReason, State,
 };
 
 use crate::bench::{Bench, PERIOD, SILENCE};
@@ -145,6 +145,7 @@ fn jump() -> MotionRequest {
         top: -0.2,
         clearance: 0.01,
         speed: 1e-3,
+        posture: Posture::NEAREST,
     }
 }
 

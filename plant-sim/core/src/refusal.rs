@@ -1,6 +1,6 @@
 //! What a person reads when the controller refuses a request: reason, axis, parameter, value and what is allowed.
 
-use protocol::messages::{MotionRequest, Refusal, RefusalReason};
+use protocol::messages::{ElbowSide, MotionRequest, Posture, Refusal, RefusalReason};
 
 use crate::model::AXES;
 
@@ -31,6 +31,23 @@ pub(crate) fn sentence(request: &MotionRequest, refusal: &Refusal) -> String {
             text += &format!("; {parameter}{value}{space}{unit}, limit {limit}{space}{unit}");
         }
     }
+    if refusal.reason == RefusalReason::JointLimit
+        && let Some(posture) = request.posture()
+    {
+        text += &asked(posture);
+    }
+    text
+}
+
+/// The posture that was asked for, and so may be what is in the way.
+fn asked(posture: Posture) -> String {
+    let mut text = String::new();
+    if posture.elbow != ElbowSide::Keep {
+        text += &format!(", with elbow {}", posture.elbow);
+    }
+    if let Some(turn) = posture.turn.number() {
+        text += &format!(", in turn {turn} of the wrist");
+    }
     text
 }
 
@@ -43,6 +60,7 @@ fn parameter(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str>
         (MotionRequest::Jump { .. }, Reason::JointLimit) if refusal.axis == 2 => "to or top",
         (_, Reason::OutOfRange) if request.is_move() => "speed",
         (_, Reason::TooFar | Reason::TooNear | Reason::JointLimit | Reason::Singular) => "to",
+        (_, Reason::ElbowSide) => "elbow",
         (_, Reason::PayloadTooHeavy) => "mass",
         (
             MotionRequest::SetGains {
@@ -84,6 +102,8 @@ fn unit(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
+    use protocol::messages::WristTurn;
+
     use super::*;
 
     fn jump(reason: RefusalReason, axis: u8, value: f32, limit: f32) -> String {
@@ -92,6 +112,10 @@ mod tests {
             top: -0.25,
             clearance: 0.005,
             speed: 1.0,
+            posture: Posture {
+                elbow: ElbowSide::Keep,
+                turn: WristTurn::MinusOne,
+            },
         };
         let refusal = Refusal {
             reason,
@@ -106,7 +130,8 @@ mod tests {
     fn a_refusal_names_axis_parameter_value_limit_and_unit() {
         assert_eq!(
             jump(RefusalReason::JointLimit, 1, 2.75, 2.5),
-            "An axis would leave its range; axis elbow; parameter to: 2.75 rad, limit 2.5 rad"
+            "An axis would leave its range; axis elbow; parameter to: 2.75 rad, limit 2.5 rad, \
+             in turn -1 of the wrist"
         );
         assert_eq!(
             jump(RefusalReason::OutOfRange, Refusal::NO_AXIS, -0.5, 0.0),

@@ -19,6 +19,7 @@ use serde::Serialize;
 
 use crate::operator::program::{Action, Program, Task};
 use crate::setup::{RunConfig, SetupError};
+use crate::text::lines;
 use crate::world::{CellEvent, OperatorError, Spot};
 
 /// Distance within which a cycle ends where it began, rad and m: roundings of f32, and far below what matters.
@@ -64,12 +65,13 @@ pub enum RehearsalError {
     /// The run could not begin.
     #[error(transparent)]
     Setup(#[from] SetupError),
-    /// It would end early.
-    #[error(transparent)]
-    Operator(#[from] OperatorError),
+    /// It would end early: what is refused, or what else ends it.
+    #[error("{}", lines(.0))]
+    Operator(Vec<OperatorError>),
 }
 
-/// Plans a scenario.
+/// Plans a scenario. After a refusal it goes on to the end of the cycle, from where the arm then is: whoever mends one step
+/// wants to know of the others.
 ///
 /// # Errors
 /// See [`RehearsalError`].
@@ -80,19 +82,33 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, RehearsalError> {
     let cycles = u64::from(scenario.cycles);
     let (mut done, mut begun, mut from) = (0, 0, stage.pose());
     let mut repeated = 0;
+    let mut refused = Vec::new();
     for Task { action, spot } in Program::new(scenario) {
         match action {
             Action::Cell(CellEvent::BeginCycle) => (begun, from) = (stage.samples, stage.pose()),
             Action::Cell(CellEvent::EndCycle) => {
                 done += 1;
+                if !refused.is_empty() {
+                    break;
+                }
                 if stage.is_at(&from) {
                     // The others are the same.
                     repeated = (cycles - done) * (stage.samples - begun);
                     break;
                 }
             }
-            _ => stage.act(&action, spot)?,
+            _ => match stage.act(&action, spot) {
+                Ok(()) => {}
+                Err(refusal @ OperatorError::Refused { .. }) => refused.push(refusal),
+                Err(end) => {
+                    refused.push(end);
+                    break;
+                }
+            },
         }
+    }
+    if !refused.is_empty() {
+        return Err(RehearsalError::Operator(refused));
     }
     Ok(Plan {
         scenario: scenario.name.clone(),

@@ -3,7 +3,9 @@
 mod change;
 mod check;
 mod error;
+mod step;
 
+use protocol::messages::WristTurn;
 use protocol::parameters::ControllerParameter as Parameter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -15,10 +17,11 @@ use crate::model::Payload;
 use crate::selection::LawChoice;
 
 pub use change::Change;
-use error::with_nearest;
+use error::for_people;
 pub use error::{Place, ScenarioError};
 
 pub use crate::text::Source;
+pub use step::{Elbow, Joints, Jump, Line, Step};
 
 macro_rules! built_in {
     ($($name:literal),+) => {
@@ -52,10 +55,17 @@ pub struct Scenario {
     /// Gains; otherwise the controller's defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainsSpec>,
-    /// Tool pose at the start: x, y, z, yaw. The elbow bends to the positive side.
+    /// Tool pose at the start: x, y, z, yaw.
     #[serde(deserialize_with = "exactly")]
     #[schemars(transform = by(check::POSE))]
     pub start: [f64; 4],
+    /// Side to which the elbow bends at the start; positive if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_elbow: Option<Elbow>,
+    /// Turn of the wrist at the start: whole revolutions of theta4, 0 from -pi to pi; the one nearest to 0 if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -WristTurn::MOST, max = WristTurn::MOST))]
+    pub start_turn: Option<i8>,
     /// Payload at the flange from the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub payload: Option<PayloadSpec>,
@@ -201,86 +211,12 @@ impl Default for Mismatch {
     }
 }
 
-/// One step of a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Step {
-    /// Gate move: up, across, down.
-    Jump(Jump),
-    /// Straight line of the tool.
-    Line(Line),
-    /// Straight in joint space.
-    Joints(Line),
-    /// Wait until the arm has arrived, then this many seconds.
-    Dwell(#[schemars(transform = by(check::SECONDS))] f64),
-    /// This many seconds after the last move was accepted, stop on the path.
-    Stop(#[schemars(transform = by(check::SECONDS))] f64),
-    /// Take a payload and announce it.
-    Pick(PayloadSpec),
-    /// Release the payload and announce it.
-    Place {},
-}
-
-impl Step {
-    /// Its key.
-    pub(crate) fn name(&self) -> &'static str {
-        match self {
-            Self::Jump(_) => "jump",
-            Self::Line(_) => "line",
-            Self::Joints(_) => "joints",
-            Self::Dwell(_) => "dwell",
-            Self::Stop(_) => "stop",
-            Self::Pick(_) => "pick",
-            Self::Place {} => "place",
-        }
-    }
-}
-
-/// A gate move.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Jump {
-    /// Flange at the end: x, y, z (m) and yaw (rad) in frame 0.
-    #[serde(deserialize_with = "exactly")]
-    #[schemars(transform = by(check::POSE))]
-    pub to: [f64; 4],
-    /// Least z of the flange on its way across, m in frame 0: absolute, not relative to start or end.
-    #[schemars(transform = by(check::LENGTH))]
-    pub top: f64,
-    /// Length of the strictly vertical part at each end, m upwards from the flange at that end; 0 for free corners.
-    #[schemars(transform = by(check::CLEARANCE))]
-    #[serde(default)]
-    pub clearance: f64,
-    /// Share of full speed.
-    #[serde(default = "full")]
-    #[schemars(transform = by(check::SPEED))]
-    pub speed: f64,
-}
-
-/// A move to a pose or to joint positions.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Line {
-    /// Flange x, y, z (m) and yaw (rad) in frame 0, or the four joint positions (rad, rad, m, rad).
-    #[serde(deserialize_with = "exactly")]
-    #[schemars(transform = by(check::EITHER))]
-    pub to: [f64; 4],
-    /// Share of full speed.
-    #[serde(default = "full")]
-    #[schemars(transform = by(check::SPEED))]
-    pub speed: f64,
-}
-
 #[expect(
     clippy::trivially_copy_pass_by_ref,
     reason = "serde hands over a reference"
 )]
 fn is_zero(seed: &u64) -> bool {
     *seed == 0
-}
-
-fn full() -> f64 {
-    1.0
 }
 
 /// The text of the scenario of this name that comes with the program.
@@ -316,7 +252,7 @@ impl Scenario {
     pub fn parse_with(text: &str, origin: &str, changes: &[Change]) -> Result<Self, ScenarioError> {
         let mut scenario: Self = toml::from_str(text).map_err(|error| ScenarioError::Parse {
             origin: origin.into(),
-            message: with_nearest(error.to_string().trim_end()),
+            message: for_people(error.to_string().trim_end()),
         })?;
         if let Some(changed) = change::changed(text, origin, changes)? {
             scenario = changed;

@@ -11,7 +11,8 @@ use crate::model::{JointLimits, RobotModel};
 use crate::plant::arm::Arm;
 use crate::plant::kinematics::{Pose, Unreachable, Violation, inverse};
 use crate::rig::{self, RigConfig};
-use crate::scenario::{Scenario, ScenarioError, Step};
+use crate::scenario::{Elbow, Scenario, ScenarioError, Step};
+use crate::text::lines;
 
 /// Configuration of a run.
 #[derive(Clone, Debug)]
@@ -66,6 +67,9 @@ pub enum SetupError {
         /// Load.
         source: Overload,
     },
+    /// Several of these.
+    #[error("{}", lines(.0))]
+    Several(Vec<SetupError>),
 }
 
 impl RunConfig {
@@ -84,29 +88,44 @@ impl RunConfig {
     /// The robot cannot reach the start, the controller cannot use the model, or the bus cannot carry the messages.
     pub fn rig(&self) -> Result<RigConfig, SetupError> {
         let scenario = &self.scenario;
-        scenario.check_with(&self.nominal)?;
         let nominal = ArmModel::from(&self.nominal);
-        nominal.validate().map_err(|source| SetupError::Model {
-            robot: self.nominal.name.clone(),
-            source,
-        })?;
         let mut actual = self.actual.clone();
         for axis in 0..4 {
             actual.drive.viscous[axis] *= scenario.mismatch.friction;
             actual.drive.coulomb[axis] *= scenario.mismatch.friction;
         }
-        let rig = RigConfig {
-            start: start(scenario, &actual)?,
-            actual,
-            nominal,
-            period: Period::of_rate(scenario.rate_hz),
-            timing: BitTiming::default(),
-        };
-        rig::admit(&rig.timing, scenario.rate_hz).map_err(|source| SetupError::Link {
+        let timing = BitTiming::default();
+        let mut wrong = Vec::new();
+        wrong.extend(
+            scenario
+                .check_with(&self.nominal)
+                .err()
+                .map(SetupError::from),
+        );
+        wrong.extend(nominal.validate().err().map(|source| SetupError::Model {
+            robot: self.nominal.name.clone(),
+            source,
+        }));
+        let load = rig::admit(&timing, scenario.rate_hz);
+        wrong.extend(load.err().map(|source| SetupError::Link {
             rate_hz: scenario.rate_hz,
             source,
-        })?;
-        Ok(rig)
+        }));
+        let start = start(scenario, &actual).map_err(|error| wrong.push(error));
+        if let (Ok(start), []) = (start, wrong.as_slice()) {
+            return Ok(RigConfig {
+                start,
+                actual,
+                nominal,
+                period: Period::of_rate(scenario.rate_hz),
+                timing,
+            });
+        }
+        Err(if wrong.len() == 1 {
+            wrong.remove(0)
+        } else {
+            SetupError::Several(wrong)
+        })
     }
 
     /// Target of the tool at the end of a cycle: x, y, z (m) and yaw (rad) in frame 0; none after a stop on the path.
@@ -129,25 +148,29 @@ impl RunConfig {
     }
 }
 
-/// Joint positions at the start: those of the elbow at the positive side.
+/// Joint positions at the start.
 fn start(scenario: &Scenario, robot: &RobotModel) -> Result<[f64; 4], SetupError> {
     let [x, y, z, yaw] = scenario.start;
-    let solutions = inverse(&robot.geometry, &robot.limits, &Pose { x, y, z, yaw });
-    let why = match solutions {
-        Ok([positive, negative]) => match positive.violation {
-            None => return Ok(positive.q.into()),
-            Some(violation) => {
-                let why = out_of_range(violation, robot, &positive.q);
-                if negative.violation.is_some() {
-                    why
-                } else {
-                    format!(
-                        "{why}, with the elbow at the positive side, where a scenario starts. With the elbow at the other side \
-                         the robot reaches it"
-                    )
-                }
+    let why = match inverse(&robot.geometry, &robot.limits, &Pose { x, y, z, yaw }) {
+        Ok(solutions) => {
+            let turn = scenario.start_turn;
+            let [positive, negative] = solutions.map(|it| it.in_turn(&robot.limits, turn));
+            let (asked, other, key) = match scenario.start_elbow {
+                None | Some(Elbow::Positive) => (positive, negative, Elbow::Negative),
+                Some(Elbow::Negative) => (negative, positive, Elbow::Positive),
+            };
+            let Some(violation) = asked.violation else {
+                return Ok(asked.q.into());
+            };
+            let mut why = out_of_range(violation, robot, &asked.q);
+            if let (Violation::Wrist, Some(turn)) = (violation, turn) {
+                why += &format!(", in start_turn = {turn}");
             }
-        },
+            if other.violation.is_none() {
+                why += &format!(". With start_elbow = \"{key}\" the robot reaches it");
+            }
+            why
+        }
         Err(unreachable) => {
             let radius = hypot(x, y);
             let (outer, inner) = (
@@ -156,11 +179,13 @@ fn start(scenario: &Scenario, robot: &RobotModel) -> Result<[f64; 4], SetupError
             );
             match unreachable {
                 Unreachable::TooFar => {
-                    format!("it is {radius} m from axis 1, and the stretched arm reaches {outer} m")
+                    format!(
+                        "it is {radius:.6} m from axis 1, and the stretched arm reaches {outer:.6} m"
+                    )
                 }
                 Unreachable::InsideHole => {
                     format!(
-                        "it is {radius} m from axis 1, and the folded arm comes no nearer than {inner} m"
+                        "it is {radius:.6} m from axis 1, and the folded arm comes no nearer than {inner:.6} m"
                     )
                 }
             }

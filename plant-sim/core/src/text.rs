@@ -25,3 +25,19 @@ pub(crate) fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> O
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, known)| known)
 }
+
+/// Several messages, one on a line.
+pub(crate) fn lines(messages: &[impl ToString]) -> String {
+    let lines: Vec<String> = messages.iter().map(ToString::to_string).collect();
+    lines.join("\n")
+}
+
+/// A number in a message: very large and very small ones with an exponent.
+pub(crate) fn number(number: f64) -> String {
+    let size = number.abs();
+    if size != 0.0 && size.is_finite() && !(1e-9..1e15).contains(&size) {
+        format!("{number:e}")
+    } else {
+        number.to_string()
+    }
+}

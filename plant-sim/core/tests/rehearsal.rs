@@ -8,6 +8,7 @@
     reason = "a test fails by panicking"
 )]
 
+use sim::observer::{Observer, Truth};
 use sim::rehearsal::{RehearsalError, rehearse};
 use sim::run::in_process;
 use sim::scenario::{Change, Scenario};
@@ -109,11 +110,105 @@ fn what_a_rehearsal_refuses_a_run_refuses_in_the_same_words() {
         let Err(RehearsalError::Operator(error)) = rehearse(&config) else {
             panic!("{steps}: not refused");
         };
-        let error = error.to_string();
+        assert_eq!(error.len(), 1, "{error:?}");
+        let error = error[0].to_string();
         assert!(error.contains(key) && error.contains(word), "{error}");
         // The robot of a run is where it is in other digits.
         let words = |text: &str| text.replace(|c: char| c.is_ascii_digit() || c == '.', "");
         assert_eq!(words(&run(&config).error.unwrap()), words(&error));
+    }
+}
+
+#[test]
+fn every_step_that_is_refused_is_named() {
+    let config = scenario(
+        "[[cycle]]\nline = { to = [5.0, 0.1, -0.2, 0.0] }\n[[cycle]]\njoints = { to = [0.5, 1.5, 0.1, 0.0] }\n\
+         [[cycle]]\njoints = { to = [0.5, -1.5, 0.5, 0.0] }\n[[cycle]]\ndwell = 0.1",
+    );
+    let Err(RehearsalError::Operator(errors)) = rehearse(&config) else {
+        panic!("not refused");
+    };
+    let words: Vec<String> = errors.iter().map(ToString::to_string).collect();
+    assert_eq!(words.len(), 2, "{words:?}");
+    assert!(
+        words[0].contains("cycle[0].line") && words[1].contains("cycle[2].joints"),
+        "{words:?}"
+    );
+}
+
+#[test]
+fn elbow_and_turn_are_asked_for_in_start_jump_and_line() {
+    let config = scenario(
+        "start_elbow = \"negative\"\nstart_turn = 1\n\
+         [[cycle]]\njump = { to = [0.6, 0.2, -0.2, 0.0], top = -0.15, elbow = \"positive\", turn = -1 }\n\
+         [[cycle]]\nline = { to = [0.6, 0.1, -0.2, 0.0], turn = 0 }\n\
+         [[cycle]]\njump = { to = [0.5, 0.1, -0.2, 0.0], top = -0.15, elbow = \"negative\", turn = 1 }",
+    );
+    let start = config.rig().unwrap().start;
+    assert!(
+        start[1] < 0.0 && (3.2..6.98).contains(&start[3]),
+        "{start:?}"
+    );
+    // The second cycle is as the first.
+    assert_eq!(rehearse(&config).unwrap().moves.len(), 3);
+    let mut ends = Ends::default();
+    let summary = in_process(&config, &mut ends).unwrap();
+    assert!(summary.completed, "{:?}", summary.error);
+    assert!(
+        summary
+            .each_cycle
+            .iter()
+            .all(|cycle| cycle.final_error_mm.unwrap() < 0.05)
+    );
+    // As the robot stood: both sides and both turns, and back.
+    assert!(
+        ends.elbow[0] < -0.5 && ends.elbow[1] > 0.5,
+        "{:?}",
+        ends.elbow
+    );
+    assert!(
+        ends.wrist[0] < -3.2 && ends.wrist[1] > 3.2,
+        "{:?}",
+        ends.wrist
+    );
+
+    for (steps, word) in [
+        (
+            "[[cycle]]\nline = { to = [0.6, 0.1, -0.2, 0.0], elbow = \"negative\" }",
+            "parameter elbow",
+        ),
+        (
+            "[[cycle]]\njump = { to = [0.6, 0.1, -0.2, 0.0], top = -0.15, turn = 2 }",
+            "in turn 2 of the wrist",
+        ),
+        (
+            "[[cycle]]\njump = { to = [-0.6, 0.75, -0.2, 0.0], top = -0.15, elbow = \"negative\" }",
+            "with elbow negative",
+        ),
+    ] {
+        let Err(RehearsalError::Operator(errors)) = rehearse(&scenario(steps)) else {
+            panic!("{steps}: not refused");
+        };
+        assert!(errors[0].to_string().contains(word), "{}", errors[0]);
+    }
+}
+
+/// Least and greatest true angle of elbow and wrist.
+#[derive(Default)]
+struct Ends {
+    elbow: [f64; 2],
+    wrist: [f64; 2],
+}
+
+impl Observer for Ends {
+    fn sample(&mut self, truth: &Truth) -> std::io::Result<()> {
+        for (range, at) in [
+            (&mut self.elbow, truth.plant.q[1]),
+            (&mut self.wrist, truth.plant.q[3]),
+        ] {
+            *range = [range[0].min(at), range[1].max(at)];
+        }
+        Ok(())
     }
 }
 

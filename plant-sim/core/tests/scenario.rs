@@ -63,7 +63,21 @@ fn what_does_not_fit_the_text_is_refused() {
             "magic",
             "no control law 'magic'",
         ),
-        ("dwell = 0.1", "wait = 0.1", "unknown variant `wait`"),
+        ("dwell = 0.1", "wait = 0.1", "unknown word `wait`"),
+        ("dwell = 0.1", "dwel = 0.1", "did you mean dwell?"),
+        ("cycles = 2", "cycles = -2", "a whole number from 0 to"),
+        (
+            "cycles = 2",
+            "cycles = 2.5",
+            "number `2.5`, expected a whole",
+        ),
+        ("= 1000", "= \"1 kHz\"", "expected a number"),
+        (
+            "start = [0.5, 0.1, -0.2, 0.0]",
+            "start = 0.5",
+            "expected an array",
+        ),
+        ("cycles = 2", "cycles = 2\ngains = 1", "expected a table"),
         (
             "dwell = 0.1",
             "place = { now = 1 }",
@@ -103,6 +117,7 @@ fn values_out_of_range_are_named_with_place_value_and_range() {
             "line 2, column 10: cycles is 0; allowed: 1 to 1000000",
         ),
         ("cycles = 2", "cycles = 1000000000", "allowed: 1 to 1000000"),
+        ("= 1000", "= 1e300", "rate_hz is 1e300; allowed"),
         (
             "= 1000",
             "= 1",
@@ -122,12 +137,17 @@ fn values_out_of_range_are_named_with_place_value_and_range() {
         (
             "clearance = 0.005 }",
             "clearance = 0.005, speed = 2.0 }",
-            "cycle[0].jump.speed is 2; allowed: a number > 0, at most 1 of full speed",
+            "cycle[0].jump.speed is 2; allowed: a number from 0.0001 to 1 of full speed",
         ),
         (
             "clearance = 0.005",
             "clearance = -0.05",
             "line 13, column 63: cycle[0].jump.clearance is -0.05; allowed: a number >= 0, at most 1 m",
+        ),
+        (
+            "clearance = 0.005 }",
+            "clearance = 0.005, speed = 1e-9 }",
+            "cycle[0].jump.speed is 0.000000001; allowed: a number from 0.0001",
         ),
         // Millimetres and degrees.
         (
@@ -184,7 +204,7 @@ fn values_out_of_range_are_named_with_place_value_and_range() {
         (
             "[0.008, 0.008, 0.01]",
             "[0.008, 0.008, 1e300]",
-            "payload.inertia_com_diag[2] is 1000",
+            "payload.inertia_com_diag[2] is 1e300",
         ),
         (
             "[[cycle]]\ndwell",
@@ -278,5 +298,89 @@ fn a_scenario_written_out_reads_back_as_it_is() {
             scenario.source = Source::default();
         }
         assert_eq!(format!("{scenario:?}"), format!("{again:?}"), "{written}");
+    }
+}
+
+#[test]
+fn every_wrong_value_is_named() {
+    let text = BASE
+        .replace("cycles = 2", "cycles = 0")
+        .replace("mass = 2.0", "mass = -2.0")
+        .replace("dwell = 0.1", "dwell = -1");
+    let message = said_of(&text);
+    let lines: Vec<&str> = message.lines().collect();
+    assert_eq!(lines.len(), 3, "{message}");
+    for (line, words) in
+        lines
+            .iter()
+            .zip(["cycles is 0", "payload.mass is -2", "cycle[1].dwell is -1"])
+    {
+        assert!(
+            line.starts_with("scenario x.toml: line ") && line.contains(words),
+            "{line}"
+        );
+    }
+
+    // What needs the robot: the payload, the start and the rate.
+    let text = BASE
+        .replace("mass = 2.0", "mass = 23.0")
+        .replace("[0.5, 0.1, -0.2, 0.0]", "[2.5, 0.1, -0.2, 0.0]")
+        .replace("= 1000", "= 5000");
+    let message = said_of(&text);
+    assert_eq!(message.lines().count(), 3, "{message}");
+    for words in ["payload.mass is 23", "at 5000 Hz", "start pose x 2.5"] {
+        assert!(message.contains(words), "{message}");
+    }
+}
+
+#[test]
+fn a_start_is_taken_at_the_side_and_in_the_turn_asked_for() {
+    let start = |lines: &str| {
+        let text = BASE.replace("start = [0.5, 0.1, -0.2, 0.0]", lines);
+        RunConfig::new(Scenario::parse(&text, "x.toml").unwrap()).rig()
+    };
+    let at = |lines: &str| start(lines).unwrap().start;
+    let usual = at("start = [0.5, 0.1, -0.2, 1.3]");
+    assert!(usual[1] > 0.0);
+    let positive = "start = [0.5, 0.1, -0.2, 1.3]\nstart_elbow = \"positive\"\nstart_turn = 0";
+    assert_eq!(at(positive), usual);
+    let other = at("start = [0.5, 0.1, -0.2, 1.3]\nstart_elbow = \"negative\"");
+    assert!((other[1] + usual[1]).abs() < 1e-12);
+    for (turn, number) in [("-1", -1.0), ("1", 1.0)] {
+        let turned = at(&format!(
+            "start = [0.5, 0.1, -0.2, 1.3]\nstart_turn = {turn}"
+        ));
+        assert!((turned[3] - usual[3] - number * std::f64::consts::TAU).abs() < 1e-12);
+        assert_eq!(turned[..3], usual[..3]);
+    }
+
+    // Behind the base on one side: only the left arm reaches it.
+    let behind = start("start = [-0.6, -0.75, -0.2, 0.0]")
+        .unwrap_err()
+        .to_string();
+    assert!(
+        behind.contains("axis shoulder")
+            && behind.contains("With start_elbow = \"negative\" the robot reaches it"),
+        "{behind}"
+    );
+    at("start = [-0.6, -0.75, -0.2, 0.0]\nstart_elbow = \"negative\"");
+    let turn = start("start = [0.5, 0.1, -0.2, 0.0]\nstart_turn = 2")
+        .unwrap_err()
+        .to_string();
+    assert!(
+        turn.contains("axis wrist") && turn.contains("in start_turn = 2"),
+        "{turn}"
+    );
+
+    for (lines, words) in [
+        ("start_turn = 3", "start_turn is 3; allowed: -2 to 2"),
+        ("start_turn = 0.5", "expected a whole number"),
+        (
+            "start_elbow = \"up\"",
+            "unknown word `up`, expected `positive` or `negative`",
+        ),
+    ] {
+        let message = refusal("rate_hz = 1000", &format!("rate_hz = 1000\n{lines}"));
+        assert!(message.contains(words), "{message}");
     }
 }

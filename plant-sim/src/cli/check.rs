@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use sim::rehearsal::{Plan, RehearsalError, rehearse};
+use sim::world::OperatorError;
 
 use super::run::ConfigArgs;
 use super::{Failure, show};
@@ -26,16 +27,28 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), Failure> {
     let config = args.config.config(&args.scenario)?;
     let plan = rehearse(&config).map_err(|error| match error {
         RehearsalError::Setup(error) => Failure::usage(error),
-        RehearsalError::Operator(error) => Failure::failed(format!(
-            "scenario {} cannot run: {error}",
-            config.scenario.name
-        )),
+        RehearsalError::Operator(errors) => {
+            Failure::failed(refused(&config.scenario.name, &errors))
+        }
     })?;
     if args.json {
         let json = serde_json::to_string_pretty(&plan).map_err(|error| error.to_string())?;
         show(&(json + "\n"))
     } else {
         show(&text(&plan))
+    }
+}
+
+/// Why a scenario cannot run. A step after a refused one has another start than it would have.
+fn refused(name: &str, errors: &[OperatorError]) -> String {
+    match errors {
+        [error] => format!("scenario {name} cannot run: {error}"),
+        _ => errors.iter().fold(
+            format!(
+                "scenario {name} cannot run; after a refusal, steps are planned from where the arm is:"
+            ),
+            |text, error| text + &format!("\n  {error}"),
+        ),
     }
 }
 

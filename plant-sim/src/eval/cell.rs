@@ -1,6 +1,8 @@
 //! Results and their text form.
 
 use nalgebra::Vector4;
+
+use super::Elbow;
 use std::fmt;
 
 /// One result.
@@ -67,14 +69,21 @@ impl Reach {
 }
 
 /// Results of inverse kinematics: the solutions with `theta2 >= 0` and with `theta2 <= 0`, the determinant of the
-/// Jacobian at the first, and how well the pose determines theta2.
+/// Jacobian at the first, and how well the pose determines theta2. The reason is that of the elbow asked for, or of the better
+/// one.
 pub(super) fn ik_cells<T: Into<Cell> + Copy>(
     solutions: [(Vector4<T>, Reach); 2],
+    elbow: Option<Elbow>,
     determinant: T,
     tolerance: T,
 ) -> Vec<Cell> {
     let [(_, a), (_, b)] = solutions;
-    let mut cells = vec![Cell::Text(a.min(b).label())];
+    let reach = match elbow {
+        None => a.min(b),
+        Some(Elbow::Positive) => a,
+        Some(Elbow::Negative) => b,
+    };
+    let mut cells = vec![Cell::Text(reach.label())];
     for (q, reach) in solutions {
         cells.extend(q.iter().map(|&x| x.into()));
         cells.push(Cell::Flag(reach == Reach::Ok));

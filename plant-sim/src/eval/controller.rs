@@ -1,14 +1,16 @@
 //! The formulas of the controller, in its own precision.
 
+use std::f32::consts::TAU;
+
 use super::cell::{Cell, Reach, ik_cells};
-use super::{EvalError, Side};
+use super::{EvalError, Posture, Side};
 use firmware::mechanics::arm::{ArmModel, Axis, Payload};
 use firmware::mechanics::dynamics::drive::Drive;
 use firmware::mechanics::dynamics::lagrange::Lagrange;
 use firmware::mechanics::dynamics::newton_euler;
 use firmware::mechanics::jacobian::Jacobian;
 use firmware::mechanics::kinematics::{
-    Elbow, IkError, Pose, Trig, forward_with, inverse, rotation, solve,
+    Elbow, IkError, Pose, Trig, Wrist, forward_with, locate, rotation, solve,
 };
 use nalgebra::{Matrix4, Vector4, Vector6};
 use sim::model::{self, RobotModel};
@@ -86,16 +88,13 @@ impl Controller {
         }
     }
 
-    /// The wrapped solution, compared with the limits but not clamped to them.
-    fn solution(&self, pose: &Pose, elbow: Elbow) -> (Vector4<f32>, Reach) {
-        let reach = match inverse(&self.arm, pose, elbow, &Vector4::zeros()) {
-            Ok(_) => Reach::Ok,
-            Err(error) => error.into(),
-        };
-        (
-            solve(&self.arm.geometry, pose, elbow).unwrap_or(Vector4::repeat(f32::NAN)),
-            reach,
-        )
+    /// The solution in its turn, compared with the limits but not clamped to them.
+    fn solution(&self, pose: &Pose, elbow: Elbow, turn: Option<i8>) -> (Vector4<f32>, Reach) {
+        let wrist = turn.map_or(Wrist::Near(0.0), Wrist::Turn);
+        let found = locate(&self.arm, pose, elbow, wrist);
+        let mut q = solve(&self.arm.geometry, pose, elbow).unwrap_or(Vector4::repeat(f32::NAN));
+        q.w += TAU * f32::from(turn.unwrap_or(0));
+        (q, found.map_or_else(Reach::from, |_| Reach::Ok))
     }
 }
 
@@ -139,7 +138,7 @@ impl Side for Controller {
             .collect()
     }
 
-    fn ik(&self, pose: &Vector4<f64>) -> Vec<Cell> {
+    fn ik(&self, pose: &Vector4<f64>, posture: Posture) -> Vec<Cell> {
         let pose = single(pose);
         let pose = Pose {
             x: pose.x,
@@ -147,10 +146,11 @@ impl Side for Controller {
             z: pose.z,
             yaw: pose.w,
         };
-        let solutions = [Elbow::Positive, Elbow::Negative].map(|elbow| self.solution(&pose, elbow));
+        let solutions = [Elbow::Positive, Elbow::Negative]
+            .map(|elbow| self.solution(&pose, elbow, posture.turn));
         let a = solutions[0].0;
         let determinant = Jacobian::new(&self.arm.geometry, &Trig::new(&a)).determinant();
-        ik_cells(solutions, determinant, theta2_tolerance(a.y))
+        ik_cells(solutions, posture.elbow, determinant, theta2_tolerance(a.y))
     }
 
     fn dynamics(&self, q: &Vector4<f64>, qd: &Vector4<f64>, qdd: &Vector4<f64>) -> Vec<Cell> {

@@ -1,7 +1,7 @@
 //! The formulas of the simulated robot.
 
-use super::Side;
 use super::cell::{Cell, Reach, ik_cells};
+use super::{Posture, Side};
 use nalgebra::Vector4;
 use sim::model::{Geometry, Payload, RobotModel};
 use sim::plant::arm::Arm;
@@ -51,7 +51,7 @@ impl Side for PlantSide {
             .collect()
     }
 
-    fn ik(&self, pose: &Vector4<f64>) -> Vec<Cell> {
+    fn ik(&self, pose: &Vector4<f64>, posture: Posture) -> Vec<Cell> {
         let pose = Pose {
             x: pose.x,
             y: pose.y,
@@ -62,12 +62,23 @@ impl Side for PlantSide {
         match inverse(&self.model.geometry, &self.model.limits, &pose) {
             Ok(solutions) => {
                 let theta2 = solutions[0].q[1];
-                let solutions =
-                    solutions.map(|s| (s.q, s.violation.map_or(Reach::Ok, Reach::from)));
-                ik_cells(solutions, a1 * a2 * theta2.sin(), theta2_tolerance(theta2))
+                let solutions = solutions.map(|solution| {
+                    let it = match posture.turn {
+                        None => solution,
+                        turn => solution.in_turn(&self.model.limits, turn),
+                    };
+                    (it.q, it.violation.map_or(Reach::Ok, Reach::from))
+                });
+                ik_cells(
+                    solutions,
+                    posture.elbow,
+                    a1 * a2 * theta2.sin(),
+                    theta2_tolerance(theta2),
+                )
             }
             Err(unreachable) => ik_cells(
                 [(Vector4::repeat(f64::NAN), unreachable.into()); 2],
+                posture.elbow,
                 f64::NAN,
                 f64::NAN,
             ),

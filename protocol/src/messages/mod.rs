@@ -8,6 +8,7 @@ mod cyclic;
 mod fault;
 mod motion;
 mod parameter;
+mod posture;
 mod service;
 
 pub use cyclic::{Command, ControlWord, DriveStatus, Feedback, LimitFlags, State};
@@ -16,6 +17,7 @@ pub use motion::{
     Compensation, Law, Motion, MotionReply, MotionRequest, Outcome, Refusal, RefusalReason,
 };
 pub use parameter::{Hello, ParameterError, ParameterReply, ParameterRequest, Server};
+pub use posture::{ElbowSide, Posture, WristTurn};
 pub use service::{
     Cause, EStop, EStopReason, Emergency, Heartbeat, Mode, Nmt, NmtCommand, Node, ResetReason,
 };

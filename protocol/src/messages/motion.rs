@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Posture;
 use crate::codes::codes;
 
 /// Operator to controller: one request, answered by one [`MotionReply`].
@@ -40,6 +41,8 @@ pub enum MotionRequest {
         target: [f32; 4],
         /// Fraction of the joint limits, 0 to 1.
         speed: f32,
+        /// Which joint positions at the end. The elbow cannot change its side on the way.
+        posture: Posture,
     },
     /// Up, across and down (gate motion).
     Jump {
@@ -51,6 +54,8 @@ pub enum MotionRequest {
         clearance: f32,
         /// Fraction of the joint limits, 0 to 1.
         speed: f32,
+        /// Which joint positions at the end.
+        posture: Posture,
     },
     /// Payload at the flange from now on.
     SetPayload {
@@ -108,6 +113,15 @@ impl MotionRequest {
             Self::SetPayload { .. } => "set-payload",
             Self::SelectLaw { .. } => "select-law",
             Self::SetGains { .. } => "set-gains",
+        }
+    }
+
+    /// Which joint positions are meant, where it asks for a pose.
+    #[must_use]
+    pub const fn posture(&self) -> Option<Posture> {
+        match self {
+            Self::MoveLine { posture, .. } | Self::Jump { posture, .. } => Some(*posture),
+            _ => None,
         }
     }
 
@@ -261,5 +275,7 @@ codes! {
         Stopped = 13, "stopped";
         /// The law takes no compensation.
         NoCompensation = 14, "no-compensation";
+        /// A straight line cannot bring the elbow to its other side.
+        ElbowSide = 15, "elbow-side";
     }
 }

@@ -80,20 +80,35 @@ pub(crate) fn command() -> impl Strategy<Value = Message> {
     })
 }
 
+fn posture() -> impl Strategy<Value = Posture> {
+    (select(ElbowSide::ALL), select(WristTurn::ALL))
+        .prop_map(|(elbow, turn)| Posture { elbow, turn })
+}
+
 fn request() -> impl Strategy<Value = MotionRequest> {
     use MotionRequest as R;
     prop_oneof![
         select(&[R::Enable, R::Disable, R::FaultReset, R::Stop][..]),
         (coordinates(), fraction()).prop_map(|(target, speed)| R::MoveJoint { target, speed }),
-        (coordinates(), fraction()).prop_map(|(target, speed)| R::MoveLine { target, speed }),
-        (coordinates(), -100.0..=100.0f32, fraction(), fraction()).prop_map(
-            |(target, top, clearance, speed)| R::Jump {
+        (coordinates(), fraction(), posture()).prop_map(|(target, speed, posture)| R::MoveLine {
+            target,
+            speed,
+            posture
+        }),
+        (
+            coordinates(),
+            -100.0..=100.0f32,
+            fraction(),
+            fraction(),
+            posture()
+        )
+            .prop_map(|(target, top, clearance, speed, posture)| R::Jump {
                 target,
                 top,
                 clearance,
-                speed
-            }
-        ),
+                speed,
+                posture
+            }),
         (
             0.0..=100.0f32,
             uniform3(-1.0..=1.0f32),

@@ -78,6 +78,7 @@ fn move_line() {
             request: MotionRequest::MoveLine {
                 target: [0.5, -0.25, 0.125, 3.0],
                 speed: 0.5,
+                posture: Posture::NEAREST,
             },
         }),
         5,
@@ -96,6 +97,7 @@ fn jump() {
                 top: -0.125,
                 clearance: 0.0625,
                 speed: 1.0,
+                posture: Posture::NEAREST,
             },
         }),
         5,
@@ -151,5 +153,47 @@ fn gains() {
         5,
         "2C0##10909000070420000803F00004843000000000000000000000000000000000000000000000000000000\
         000000000572CC",
+    );
+}
+
+#[test]
+fn move_line_with_a_posture() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::MoveLine {
+                target: [0.5, -0.25, 0.125, 3.0],
+                speed: 0.5,
+                posture: Posture {
+                    elbow: ElbowSide::Negative,
+                    turn: WristTurn::MinusOne,
+                },
+            },
+        }),
+        5,
+        "2C0##109050000003F000080BE0000003E000040400000003F02030000000000000000000000000000000000\
+        0000000005B5D5",
+    );
+}
+
+#[test]
+fn jump_with_a_posture() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::Jump {
+                target: [0.75, 0.25, -0.25, -1.5],
+                top: -0.125,
+                clearance: 0.0625,
+                speed: 1.0,
+                posture: Posture {
+                    elbow: ElbowSide::Positive,
+                    turn: WristTurn::PlusOne,
+                },
+            },
+        }),
+        5,
+        "2C0##109060000403F0000803E000080BE0000C0BF000000BE0000803D0000803F0102000000000000000000\
+        00000000059FAD",
     );
 }

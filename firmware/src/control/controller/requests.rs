@@ -45,17 +45,21 @@ impl Controller {
             MotionRequest::MoveJoint { target, speed } => {
                 self.enqueue(sequence, Target::Joints(Vector4::from(*target)), *speed)?
             }
-            MotionRequest::MoveLine { target, speed } => {
-                self.enqueue(sequence, Target::Line(pose(target)), *speed)?
-            }
+            MotionRequest::MoveLine {
+                target,
+                speed,
+                posture,
+            } => self.enqueue(sequence, Target::Line(pose(target), *posture), *speed)?,
             MotionRequest::Jump {
                 target,
                 top,
                 clearance,
                 speed,
+                posture,
             } => {
                 let target = Target::Jump {
                     pose: pose(target),
+                    posture: *posture,
                     top: *top,
                     clearance: *clearance,
                 };

@@ -160,11 +160,33 @@ pub fn inverse(
     elbow: Elbow,
     near: &Vector4<f32>,
 ) -> Result<Vector4<f32>, IkError> {
-    if !near.w.is_finite() {
-        return Err(IkError::NotFinite);
-    }
+    locate(arm, pose, elbow, Wrist::Near(near.w))
+}
+
+/// Which turn of the wrist is meant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Wrist {
+    /// The nearest to this angle.
+    Near(f32),
+    /// This many revolutions, and at most half a one more or less.
+    Turn(i8),
+}
+
+/// Joint position for `pose` within the limits of `arm`, with the wrist in the turn that is meant.
+///
+/// # Errors
+/// Those of [`inverse`].
+pub fn locate(
+    arm: &ArmModel,
+    pose: &Pose,
+    elbow: Elbow,
+    wrist: Wrist,
+) -> Result<Vector4<f32>, IkError> {
     let mut q = solve(&arm.geometry, pose, elbow)?;
-    q.w = nearest_turn(q.w, near.w, arm.limits.lower.w, arm.limits.upper.w);
+    q.w = match wrist {
+        Wrist::Near(near) => nearest_turn(q.w, near, arm.limits.lower.w, arm.limits.upper.w),
+        Wrist::Turn(turn) => q.w + f32::from(turn) * TAU,
+    };
     within_limits(&q, &arm.limits)
 }
 
@@ -183,24 +205,40 @@ fn nearest_turn(angle: f32, near: f32, lower: f32, upper: f32) -> f32 {
 }
 
 /// `q` with each value that exceeds a limit only by rounding clamped to it.
+///
+/// # Errors
+/// [`IkError::NotFinite`], and [`IkError::Limit`] for the first axis that exceeds a limit by more than [`LIMIT_TOLERANCE`].
 fn within_limits(q: &Vector4<f32>, limits: &JointLimits) -> Result<Vector4<f32>, IkError> {
-    for axis in Axis::ALL {
-        let (value, lower, upper) = (axis.of(q), axis.of(&limits.lower), axis.of(&limits.upper));
-        let slack = LIMIT_TOLERANCE * (upper - lower);
-        if value < lower - slack {
-            return Err(IkError::Limit {
-                axis,
-                value,
-                limit: lower,
-            });
-        }
-        if value > upper + slack {
-            return Err(IkError::Limit {
-                axis,
-                value,
-                limit: upper,
-            });
-        }
-    }
+    let slack = (limits.upper - limits.lower) * LIMIT_TOLERANCE;
+    check_range(q, &(limits.lower - slack), &(limits.upper + slack), limits)?;
     Ok(q.zip_zip_map(&limits.lower, &limits.upper, clamp))
+}
+
+/// Whether every axis is between `lower` and `upper`. The error names what it breaks of `limits`, which are those or narrower.
+///
+/// # Errors
+/// [`IkError::NotFinite`], [`IkError::Limit`].
+// Out of line: asked for in several places.
+#[inline(never)]
+pub(crate) fn check_range(
+    q: &Vector4<f32>,
+    lower: &Vector4<f32>,
+    upper: &Vector4<f32>,
+    limits: &JointLimits,
+) -> Result<(), IkError> {
+    let kept = |axis: &Axis| (axis.of(lower)..=axis.of(upper)).contains(&axis.of(q));
+    let Some(axis) = Axis::ALL.into_iter().find(|axis| !kept(axis)) else {
+        return Ok(());
+    };
+    let value = axis.of(q);
+    let limit = if value < axis.of(lower) {
+        axis.of(&limits.lower)
+    } else {
+        axis.of(&limits.upper)
+    };
+    Err(if value.is_finite() {
+        IkError::Limit { axis, value, limit }
+    } else {
+        IkError::NotFinite
+    })
 }

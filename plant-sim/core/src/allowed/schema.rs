@@ -48,10 +48,10 @@ impl Transform for Allowed {
     }
 }
 
-/// What each number of an array of four may be.
-pub(crate) struct Each(pub(crate) [Allowed; 4]);
+/// What each number of an array may be.
+pub(crate) struct Each<const N: usize>(pub(crate) [Allowed; N]);
 
-impl Transform for Each {
+impl<const N: usize> Transform for Each<N> {
     fn transform(&mut self, schema: &mut Schema) {
         let elements = self.0.map(|allowed| {
             let mut element = schemars::json_schema!({ "type": "number" });

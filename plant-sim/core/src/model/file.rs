@@ -60,7 +60,7 @@ const TWISTS: [Option<f64>; 4] = [Some(0.0), Some(PI), Some(0.0), Some(0.0)];
 const VERTICAL: [Option<f64>; 3] = [Some(0.0), Some(0.0), None];
 
 /// Rotary axes as `turning`, the lift as `lift`.
-const fn joints(turning: Allowed, lift: Allowed) -> Each {
+const fn joints(turning: Allowed, lift: Allowed) -> Each<4> {
     Each([turning, turning, lift, turning])
 }
 

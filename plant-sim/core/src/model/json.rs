@@ -30,9 +30,14 @@ pub(super) struct Node<'a> {
 /// Parses `text`; an error names its place. A duplicate key in an object is an error: there is no way to know which one
 /// was meant.
 pub(super) fn parse(text: &str) -> Result<Value, ModelError> {
-    let refused = |error: serde_json::Error| ModelError {
-        place: Some((error.line(), error.column())),
-        cause: ModelErrorKind::Syntax(error.to_string()),
+    let refused = |error: serde_json::Error| {
+        let text = error.to_string();
+        // Its own words for the place say the same once more.
+        let (what, _) = text.rsplit_once(" at line ").unwrap_or((&text, ""));
+        ModelError {
+            place: Some((error.line(), error.column())),
+            cause: ModelErrorKind::Syntax(what.into()),
+        }
     };
     serde_json::from_str::<NoDoubles>(text).map_err(refused)?;
     serde_json::from_str(text).map_err(refused)
@@ -235,7 +240,7 @@ impl<'a> Node<'a> {
             Value::Object(_) => "an object".to_owned(),
             Value::Number(number) => number
                 .as_f64()
-                .map_or_else(|| number.to_string(), |number| number.to_string()),
+                .map_or_else(|| number.to_string(), crate::text::number),
             scalar => scalar.to_string(),
         };
         let cause = ModelErrorKind::Wrong {

@@ -117,14 +117,16 @@ impl Program {
                 top: jump.top as f32,
                 clearance: jump.clearance as f32,
                 speed: jump.speed as f32,
+                posture: jump.posture(),
             }),
             Step::Line(line) => request(MotionRequest::MoveLine {
                 target: line.to.map(|x| x as f32),
                 speed: line.speed as f32,
+                posture: line.posture(),
             }),
-            Step::Joints(line) => request(MotionRequest::MoveJoint {
-                target: line.to.map(|x| x as f32),
-                speed: line.speed as f32,
+            Step::Joints(joints) => request(MotionRequest::MoveJoint {
+                target: joints.to.map(|x| x as f32),
+                speed: joints.speed as f32,
             }),
             Step::Dwell(seconds) => vec![
                 Action::WaitArrived,

@@ -44,6 +44,31 @@ pub struct Solution {
     pub violation: Option<Violation>,
 }
 
+impl Solution {
+    /// The same with theta4 in this turn, `turn` whole revolutions from where it is; without one, in the turn nearest to 0
+    /// that the limits allow.
+    #[must_use]
+    pub fn in_turn(mut self, limits: &JointLimits, turn: Option<i8>) -> Self {
+        const MOST: i8 = 8;
+        let within = |theta4: &f64| {
+            (limits.lower[3] - TOLERANCE..=limits.upper[3] + TOLERANCE).contains(theta4)
+        };
+        let own = self.q[3];
+        let turned = |turn: i8| own + TAU * f64::from(turn);
+        if let Some(turn) = turn {
+            self.q[3] = turned(turn);
+            let of_wrist = (!within(&self.q[3])).then_some(Violation::Wrist);
+            let of_others = self.violation.filter(|which| *which != Violation::Wrist);
+            self.violation = of_others.or(of_wrist);
+        } else {
+            let turns = (-MOST..=MOST).map(turned).filter(within);
+            let nearest = turns.min_by(|a, b| a.abs().total_cmp(&b.abs()));
+            self.q[3] = nearest.unwrap_or(own);
+        }
+        self
+    }
+}
+
 /// Radius that the arm lengths do not allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unreachable {

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use serde::Deserialize as _;
 use toml::{Table, Value};
 
-use super::error::with_nearest;
+use super::error::for_people;
 use super::{Scenario, ScenarioError};
 
 /// One value of a scenario, changed from outside its text.
@@ -120,8 +120,7 @@ pub(super) fn changed(
             .apply(&mut table)
             .map_err(|message| wrong(&message))?;
         let changed = Scenario::deserialize(table.clone());
-        scenario =
-            Some(changed.map_err(|error| wrong(&with_nearest(error.to_string().trim_end())))?);
+        scenario = Some(changed.map_err(|error| wrong(&for_people(error.to_string().trim_end())))?);
     }
     Ok(scenario)
 }

@@ -2,10 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use protocol::messages::WristTurn;
 use toml::de::{DeTable, DeValue};
 
 use super::{
-    Jump, Line, MAX_CYCLES, PayloadSpec, Place, Scenario, ScenarioError, Step, check_rate,
+    Joints, Jump, Line, MAX_CYCLES, PayloadSpec, Place, Scenario, ScenarioError, Step, check_rate,
 };
 use crate::allowed::schema::Each;
 use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
@@ -17,35 +18,40 @@ pub(super) const LENGTH: Allowed = Allowed::within(-10.0, 10.0, "m");
 const YAW: Allowed = Allowed::within(-2.0 * TAU, 2.0 * TAU, "rad");
 const JOINT: Allowed = Allowed::within(-20.0, 20.0, "rad");
 /// Of a pose: x, y, z, yaw.
-pub(super) const POSE: Each = Each([LENGTH, LENGTH, LENGTH, YAW]);
-/// Of a pose or of joint positions, whichever allows more.
-pub(super) const EITHER: Each = Each([Allowed::within(-20.0, 20.0, ""); 4]);
+pub(super) const POSE: Each<4> = Each([LENGTH, LENGTH, LENGTH, YAW]);
+/// Of joint positions: shoulder, elbow, lift, wrist.
+pub(super) const POSITIONS: Each<4> = Each([JOINT, JOINT, LENGTH, JOINT]);
 pub(super) const RATE: Allowed = Allowed::within(100.0, 10_000.0, "Hz");
 pub(super) const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
-pub(super) const SPEED: Allowed = Allowed::above_zero(1.0, "of full speed");
+/// At a ten-thousandth a move takes hours; slower ones are meant otherwise.
+pub(super) const SPEED: Allowed = Allowed::within(1e-4, 1.0, "of full speed");
 pub(super) const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
 pub(super) const FACTOR: Allowed = Allowed::within(0.0, 10.0, "");
 
 impl Scenario {
     /// Checks everything that does not depend on the robot.
     pub(super) fn check(&self) -> Result<(), ScenarioError> {
+        let mut findings = Findings::of(self);
         if !(1..=MAX_CYCLES).contains(&self.cycles) {
-            return Err(self.wrong("cycles", self.cycles, format!("1 to {MAX_CYCLES}")));
+            findings.wrong("cycles", self.cycles, format!("1 to {MAX_CYCLES}"));
         }
-        check_rate(self.rate_hz).map_err(|allowed| self.wrong("rate_hz", self.rate_hz, allowed))?;
-        self.pose("start", &self.start)?;
+        if let Err(allowed) = check_rate(self.rate_hz) {
+            findings.wrong("rate_hz", text::number(self.rate_hz), allowed);
+        }
+        findings.pose("start", &self.start);
+        findings.turn("start_turn", self.start_turn);
         if let Some(payload) = &self.payload {
-            self.payload("payload", payload)?;
+            findings.payload("payload", payload);
         }
-        self.number("mismatch.friction", self.mismatch.friction, FACTOR)?;
-        self.number("mismatch.payload", self.mismatch.payload, FACTOR)?;
+        findings.number("mismatch.friction", self.mismatch.friction, FACTOR);
+        findings.number("mismatch.payload", self.mismatch.payload, FACTOR);
         if self.cycle.is_empty() {
-            return Err(self.wrong("cycle", "empty", "at least one step"));
+            findings.wrong("cycle", "empty", "at least one step");
         }
         for (index, step) in self.cycle.iter().enumerate() {
-            self.step(&format!("cycle[{index}]"), step)?;
+            findings.step(&format!("cycle[{index}]"), step);
         }
-        Ok(())
+        findings.judge()
     }
 
     /// Checks what depends on the nominal robot: payloads that it may carry, gains that the rate allows, a gripper that
@@ -54,129 +60,179 @@ impl Scenario {
     /// # Errors
     /// See [`ScenarioError`].
     pub fn check_with(&self, robot: &RobotModel) -> Result<(), ScenarioError> {
+        let mut findings = Findings::of(self);
         if let Some(gains) = &self.gains {
             let period = (1.0 / self.rate_hz) as f32;
             for (key, parameter, value) in gains.each(period) {
                 let rule = parameter.rule();
-                rule.check(value as f32, period).map_err(|_| {
+                if rule.check(value as f32, period).is_err() {
                     let (lower, upper) = (rule.lower, rule.upper_at(period));
-                    self.wrong(
-                        key,
-                        value,
-                        format!("{lower} to {upper} at {} Hz", self.rate_hz),
-                    )
-                })?;
+                    let allowed = format!("{lower} to {upper} at {} Hz", self.rate_hz);
+                    findings.wrong(key, text::number(value), allowed);
+                }
             }
         }
-        let carry = Allowed::within(0.0, robot.payload_max, "kg");
-        let mut held = self.payload.filter(|payload| payload.mass > 0.0);
-        if let Some(payload) = held {
-            self.number("payload.mass", payload.mass, carry)?;
+        findings.gripper(Allowed::within(0.0, robot.payload_max, "kg"));
+        findings.judge()
+    }
+}
+
+/// All that is wrong with a scenario: whoever mends one value wants to know of the others.
+struct Findings<'a> {
+    scenario: &'a Scenario,
+    wrong: Vec<ScenarioError>,
+}
+
+impl<'a> Findings<'a> {
+    fn of(scenario: &'a Scenario) -> Self {
+        Self {
+            scenario,
+            wrong: Vec::new(),
         }
-        // The gripper begins a cycle with whatever it held at the end of the previous one.
-        for _ in 0..self.cycles.min(2) {
-            for (index, step) in self.cycle.iter().enumerate() {
+    }
+
+    fn judge(mut self) -> Result<(), ScenarioError> {
+        match self.wrong.len() {
+            0 => Ok(()),
+            1 => Err(self.wrong.remove(0)),
+            _ => Err(ScenarioError::Several(self.wrong)),
+        }
+    }
+
+    /// What the gripper holds from step to step. It begins a cycle with whatever it held at the end of the previous one.
+    fn gripper(&mut self, carry: Allowed) {
+        let mut held = self.scenario.payload.filter(|payload| payload.mass > 0.0);
+        if let Some(payload) = held {
+            self.number("payload.mass", payload.mass, carry);
+        }
+        for cycle in 0..self.scenario.cycles.min(2) {
+            let known = self.wrong.len();
+            for (index, step) in self.scenario.cycle.iter().enumerate() {
                 match step {
                     Step::Pick(payload) => {
                         let key = format!("cycle[{index}].pick");
                         if let Some(held) = held.replace(*payload) {
-                            return Err(self.wrong(
-                                &key,
-                                format!("a payload of {} kg", payload.mass),
-                                format!(
-                                    "an empty gripper; it holds {} kg, so place that first",
-                                    held.mass
-                                ),
-                            ));
+                            let found = format!("a payload of {} kg", payload.mass);
+                            let allowed = format!(
+                                "an empty gripper; it holds {} kg, so place that first",
+                                held.mass
+                            );
+                            self.wrong(&key, found, allowed);
                         }
-                        self.number(&format!("{key}.mass"), payload.mass, carry)?;
+                        if cycle == 0 {
+                            self.number(&format!("{key}.mass"), payload.mass, carry);
+                        }
                     }
-                    Step::Place {} if held.take().is_none() => {
-                        return Err(self.wrong(
-                            &format!("cycle[{index}].place"),
-                            "nothing",
-                            "a gripper that holds something: pick first",
-                        ));
-                    }
+                    Step::Place {} if held.take().is_none() => self.wrong(
+                        &format!("cycle[{index}].place"),
+                        "nothing",
+                        "a gripper that holds something: pick first",
+                    ),
                     _ => {}
                 }
             }
+            if self.wrong.len() > known {
+                // The next cycle would repeat it.
+                return;
+            }
         }
-        Ok(())
     }
 
-    fn step(&self, key: &str, step: &Step) -> Result<(), ScenarioError> {
+    fn step(&mut self, key: &str, step: &Step) {
         match step {
             Step::Jump(Jump {
                 to,
+                elbow: _,
+                turn,
                 top,
                 clearance,
                 speed,
             }) => {
-                self.pose(&format!("{key}.jump.to"), to)?;
-                self.number(&format!("{key}.jump.top"), *top, LENGTH)?;
-                self.number(&format!("{key}.jump.clearance"), *clearance, CLEARANCE)?;
-                self.number(&format!("{key}.jump.speed"), *speed, SPEED)
+                self.pose(&format!("{key}.jump.to"), to);
+                self.turn(&format!("{key}.jump.turn"), *turn);
+                self.number(&format!("{key}.jump.top"), *top, LENGTH);
+                self.number(&format!("{key}.jump.clearance"), *clearance, CLEARANCE);
+                self.number(&format!("{key}.jump.speed"), *speed, SPEED);
             }
-            Step::Line(Line { to, speed }) => {
-                self.pose(&format!("{key}.line.to"), to)?;
-                self.number(&format!("{key}.line.speed"), *speed, SPEED)
+            Step::Line(Line {
+                to,
+                elbow: _,
+                turn,
+                speed,
+            }) => {
+                self.pose(&format!("{key}.line.to"), to);
+                self.turn(&format!("{key}.line.turn"), *turn);
+                self.number(&format!("{key}.line.speed"), *speed, SPEED);
             }
-            Step::Joints(Line { to, speed }) => {
-                let key = format!("{key}.joints");
-                self.numbers(&format!("{key}.to"), to, |axis| {
-                    if axis == 2 { LENGTH } else { JOINT }
-                })?;
-                self.number(&format!("{key}.speed"), *speed, SPEED)
+            Step::Joints(Joints { to, speed }) => {
+                self.numbers(&format!("{key}.joints.to"), to, POSITIONS);
+                self.number(&format!("{key}.joints.speed"), *speed, SPEED);
             }
             Step::Dwell(seconds) => self.number(&format!("{key}.dwell"), *seconds, SECONDS),
             Step::Stop(seconds) => self.number(&format!("{key}.stop"), *seconds, SECONDS),
             Step::Pick(payload) => {
                 let key = format!("{key}.pick");
                 if payload.mass == 0.0 {
-                    return Err(self.wrong(&format!("{key}.mass"), 0.0, "more than 0 kg"));
+                    self.wrong(&format!("{key}.mass"), 0.0, "more than 0 kg");
                 }
-                self.payload(&key, payload)
+                self.payload(&key, payload);
             }
-            Step::Place {} => Ok(()),
+            Step::Place {} => {}
         }
     }
 
-    fn pose(&self, key: &str, pose: &[f64; 4]) -> Result<(), ScenarioError> {
-        self.numbers(key, pose, |axis| if axis == 3 { YAW } else { LENGTH })
+    fn pose(&mut self, key: &str, pose: &[f64; 4]) {
+        self.numbers(key, pose, POSE);
     }
 
-    fn payload(&self, key: &str, payload: &PayloadSpec) -> Result<(), ScenarioError> {
-        self.number(&format!("{key}.mass"), payload.mass, PAYLOAD_MASS)?;
+    fn turn(&mut self, key: &str, turn: Option<i8>) {
+        if let Some(turn) = turn
+            && WristTurn::of_number(turn).is_none()
+        {
+            let most = WristTurn::MOST;
+            self.wrong(key, turn, format!("-{most} to {most}"));
+        }
+    }
+
+    fn payload(&mut self, key: &str, payload: &PayloadSpec) {
+        self.number(&format!("{key}.mass"), payload.mass, PAYLOAD_MASS);
         let com = format!("{key}.com_flange_frame");
-        self.numbers(&com, &payload.com_flange_frame, |_| PAYLOAD_COM)?;
+        self.numbers(&com, &payload.com_flange_frame, Each([PAYLOAD_COM; 3]));
         let inertia = format!("{key}.inertia_com_diag");
-        self.numbers(&inertia, &payload.inertia_com_diag, |_| PAYLOAD_INERTIA)?;
-        check_moments(payload.inertia_com_diag).map_err(|(axis, allowed)| {
-            let moment = payload.inertia_com_diag[axis];
-            self.wrong(&format!("{inertia}[{axis}]"), moment, allowed)
-        })
-    }
-
-    fn numbers<const N: usize>(
-        &self,
-        key: &str,
-        values: &[f64; N],
-        allowed: impl Fn(usize) -> Allowed,
-    ) -> Result<(), ScenarioError> {
-        for (index, value) in values.iter().enumerate() {
-            self.number(&format!("{key}[{index}]"), *value, allowed(index))?;
+        let known = self.wrong.len();
+        let moments = payload.inertia_com_diag;
+        self.numbers(&inertia, &moments, Each([PAYLOAD_INERTIA; 3]));
+        if self.wrong.len() == known
+            && let Err((axis, allowed)) = check_moments(moments)
+        {
+            self.wrong(&format!("{inertia}[{axis}]"), moments[axis], allowed);
         }
-        Ok(())
     }
 
-    fn number(&self, key: &str, value: f64, allowed: Allowed) -> Result<(), ScenarioError> {
-        allowed
-            .check(value)
-            .map(|_| ())
-            .map_err(|allowed| self.wrong(key, value, allowed))
+    fn numbers<const N: usize>(&mut self, key: &str, values: &[f64; N], allowed: Each<N>) {
+        for (index, (value, allowed)) in values.iter().zip(allowed.0).enumerate() {
+            self.number(&format!("{key}[{index}]"), *value, allowed);
+        }
     }
 
+    fn number(&mut self, key: &str, value: f64, allowed: Allowed) {
+        if let Err(allowed) = allowed.check(value) {
+            self.wrong(key, text::number(value), allowed);
+        }
+    }
+
+    fn wrong(&mut self, key: &str, value: impl ToString, allowed: impl Into<String>) {
+        self.wrong.push(ScenarioError::Value {
+            origin: self.scenario.source.origin.clone(),
+            place: self.scenario.place(key),
+            key: key.into(),
+            value: value.to_string(),
+            allowed: allowed.into(),
+        });
+    }
+}
+
+impl Scenario {
     /// Where the value under a key is said; the last change counts.
     fn place(&self, key: &str) -> Place {
         let change = self.changes.iter().rev().find(|change| change.is_of(key));
@@ -184,16 +240,6 @@ impl Scenario {
             Some(change) => Place::Change(change.said.clone()),
             None => place(&self.source.text, key)
                 .map_or(Place::Default, |(line, column)| Place::Text(line, column)),
-        }
-    }
-
-    fn wrong(&self, key: &str, value: impl ToString, allowed: impl Into<String>) -> ScenarioError {
-        ScenarioError::Value {
-            origin: self.source.origin.clone(),
-            place: self.place(key),
-            key: key.into(),
-            value: value.to_string(),
-            allowed: allowed.into(),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::text::nearest;
+use crate::text::{lines, nearest};
 
 /// Why there is no scenario.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +39,9 @@ pub enum ScenarioError {
         /// What it may be.
         allowed: String,
     },
+    /// Several values make no sense.
+    #[error("{}", lines(.0))]
+    Several(Vec<ScenarioError>),
 }
 
 /// Where a value of a scenario is said.
@@ -62,20 +65,56 @@ impl fmt::Display for Place {
     }
 }
 
-/// Adds the nearest known key to the message about an unknown one: most likely the one that was meant.
-pub(super) fn with_nearest(message: &str) -> String {
-    let between_ticks: Vec<&str> = message
-        .rsplit_once("unknown field ")
+/// A message of the TOML reader for people: without words of Rust, and with the nearest known key for an unknown one, which
+/// most likely was meant.
+pub(super) fn for_people(message: &str) -> String {
+    let message = in_words(message);
+    let unknown = ["unknown field ", "unknown word "]
+        .iter()
+        .find_map(|words| message.rsplit_once(words));
+    let between_ticks: Vec<&str> = unknown
         .map_or("", |(_, words)| words)
         .split('`')
         .skip(1)
         .step_by(2)
         .collect();
-    match between_ticks.split_first() {
-        Some((unknown, known)) => nearest(unknown, known.iter().copied()).map_or_else(
-            || message.into(),
-            |near| format!("{message}\ndid you mean {near}?"),
-        ),
-        None => message.into(),
+    let near = between_ticks
+        .split_first()
+        .and_then(|(unknown, known)| nearest(unknown, known.iter().copied()));
+    match near {
+        Some(near) => format!("{message}\ndid you mean {near}?"),
+        None => message,
     }
+}
+
+/// Types as a person who writes TOML names them.
+const WORDS: [(&str, &str); 9] = [
+    (
+        "expected u32",
+        "expected a whole number from 0 to 4294967295",
+    ),
+    ("expected u64", "expected a whole number, 0 or more"),
+    ("expected i8", "expected a whole number from -128 to 127"),
+    ("expected f64", "expected a number"),
+    ("expected a sequence", "expected an array"),
+    ("floating point `", "number `"),
+    ("` as i128", "`"),
+    (
+        "unit variant, expected string only",
+        "no step, expected a table such as { dwell = 0.1 }",
+    ),
+    ("unknown variant", "unknown word"),
+];
+
+fn in_words(message: &str) -> String {
+    let mut message = message.to_owned();
+    for (type_name, words) in WORDS {
+        message = message.replace(type_name, words);
+    }
+    // The names of our own structures are of no use to anybody.
+    while let Some((before, after)) = message.split_once("expected struct ") {
+        let rest = after.trim_start_matches(|c: char| c.is_ascii_alphanumeric());
+        message = format!("{before}expected a table{rest}");
+    }
+    message
 }
