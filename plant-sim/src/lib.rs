@@ -14,11 +14,11 @@
 //! chart                  the SVG of plot and of external's histogram
 //! eval, input            models evaluated over the rows of a table; scenarios and robots from files
 //! reference              schemas of files and JSON output, and tables of them for the documents
-//! say, interrupt, guard  words to the terminal, signals, our own faults
+//! interrupt              signals
 //! ```
 //!
 //! The command line (`cli`, in the binary) calls these, one file per subcommand. They use `sim` for the simulation,
-//! `trace` for the text of traces, `link` for a real bus and `channel` for the board. Files, clocks, threads and
+//! `trace` for the text of traces, `link` for a real bus, `channel` for the board and `terminal` for words to the terminal. Files, clocks, threads and
 //! processes are only here, in none of those.
 //!
 //! # The path of one Feedback frame
@@ -42,7 +42,6 @@ pub mod check;
 pub mod crash;
 pub mod eval;
 pub mod external;
-pub mod guard;
 pub mod input;
 pub mod interrupt;
 pub mod monitor;
@@ -57,6 +56,7 @@ pub mod reference;
 pub mod replay;
 pub mod report;
 pub mod run;
-pub mod say;
 pub mod twin;
 pub mod viewers;
+
+pub use terminal::say;

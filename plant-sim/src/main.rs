@@ -11,8 +11,8 @@ mod cli;
 
 use std::process::ExitCode;
 
-use plant_sim::guard::guard;
+use terminal::guard;
 
 fn main() -> ExitCode {
-    ExitCode::from(guard(cli::main))
+    ExitCode::from(guard("plant-sim", env!("VERSION_AND_COMMIT"), cli::main))
 }

@@ -3,11 +3,8 @@
 use plant_sim::input::InputError;
 use plant_sim::output::OutputError;
 use plant_sim::run::ExecuteError;
+use terminal::{FAILED, USAGE};
 
-/// A run or a check failed, or the machine did not allow it.
-const FAILED: u8 = 1;
-/// Wrong usage or input.
-const USAGE: u8 = 2;
 /// There was nothing that could have been good or bad.
 const NOTHING_JUDGED: u8 = 3;
 

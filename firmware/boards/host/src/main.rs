@@ -2,6 +2,9 @@
 //!
 //! The same node as on the boards, with a socket as its CAN controller.
 
+// They panic where standard output or error is full or gone; `say!` does not.
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 mod clock;
 mod shell;
 
@@ -16,6 +19,7 @@ use firmware::control::controller::Config;
 use firmware::mechanics::arm::{ArmModel, IRB_930};
 use link::{Link, LinkAddress, realtime};
 use protocol::time::Period;
+use terminal::{FAILED, USAGE, guard, say};
 
 use crate::clock::Clock;
 use crate::shell::Shell;
@@ -39,27 +43,56 @@ struct Args {
     model: Option<PathBuf>,
 }
 
-fn main() -> ExitCode {
-    match run(&Args::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(message) => {
-            eprintln!("controller: {message}");
-            ExitCode::FAILURE
+/// Why the controller ends, as a person reads it, and the exit code (docs/exit-codes.md).
+struct Failure {
+    message: String,
+    code: u8,
+}
+
+impl Failure {
+    /// What was typed, or a file that it names, has to be changed.
+    fn usage(message: String) -> Self {
+        Self {
+            message,
+            code: USAGE,
+        }
+    }
+
+    /// The bus or the machine did not allow it.
+    fn failed(message: impl ToString) -> Self {
+        Self {
+            message: message.to_string(),
+            code: FAILED,
         }
     }
 }
 
-fn run(args: &Args) -> Result<(), String> {
-    let arm = args.model.as_deref().map_or(Ok(IRB_930), load)?;
+fn main() -> ExitCode {
+    let work = || match run(&Args::parse()) {
+        Ok(()) => 0,
+        Err(Failure { message, code }) => {
+            say!("controller: {message}");
+            code
+        }
+    };
+    ExitCode::from(guard("controller", env!("VERSION_AND_COMMIT"), work))
+}
+
+fn run(args: &Args) -> Result<(), Failure> {
+    let arm = args
+        .model
+        .as_deref()
+        .map_or(Ok(IRB_930), load)
+        .map_err(Failure::usage)?;
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
-        .map_err(|error| format!("cannot handle Ctrl-C: {error}"))?;
-    let link = Link::open(&args.bus).map_err(|error| error.to_string())?;
+        .map_err(|error| Failure::failed(format!("cannot handle Ctrl-C: {error}")))?;
+    let link = Link::open(&args.bus).map_err(Failure::failed)?;
     let period = Period::of_rate(args.rate.into());
     let clock = if args.real_time {
         for refused in realtime::claim() {
-            eprintln!("controller: {refused}");
+            say!("controller: {refused}");
         }
         Clock::real_time()
     } else {
@@ -67,7 +100,7 @@ fn run(args: &Args) -> Result<(), String> {
     };
     Shell::new(link, args.bus.to_string(), Config::new(arm, period), clock)
         .run(&stop)
-        .map_err(|error| error.to_string())
+        .map_err(Failure::failed)
 }
 
 /// The robot of a file, if the controller can use it.

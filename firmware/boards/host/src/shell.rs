@@ -9,6 +9,7 @@ use link::{Link, LinkError, Stamped};
 use protocol::frame::CanFrame;
 use protocol::messages::{Mode, Node as Name, ResetReason};
 use protocol::table;
+use terminal::say;
 
 use crate::clock::{Clock, is_feedback};
 
@@ -82,7 +83,7 @@ impl Shell {
     pub(crate) fn run(&mut self, stop: &AtomicBool) -> Result<(), ShellError> {
         self.listen(stop)?;
         self.poll(None);
-        eprintln!("controller: waiting for the drives on {}", self.bus);
+        say!("controller: waiting for the drives on {}", self.bus);
         while !stop.load(Ordering::Relaxed) {
             if self.link.wait(TICK)? {
                 while let Some(stamped) = self.link.take() {
@@ -94,7 +95,7 @@ impl Shell {
             }
             self.report_silence();
         }
-        eprintln!(
+        say!(
             "controller: stopped in {} after {} samples, {} answered late; frames not used: {}; not sent: {}",
             self.mode,
             self.counts.feedback,
@@ -129,7 +130,7 @@ impl Shell {
         }
         self.poll(Some(frame));
         if self.node.reset_asked() {
-            eprintln!("controller: reset by network management");
+            say!("controller: reset by network management");
             self.node = Node::new(self.config, ResetReason::Software);
             self.clock.restart();
             self.poll(None);
@@ -148,9 +149,9 @@ impl Shell {
             self.mode = controller.mode();
             match self.mode {
                 Mode::FaultReaction | Mode::Fault | Mode::EStop => {
-                    eprintln!("controller: {}: {}", self.mode, controller.fault());
+                    say!("controller: {}: {}", self.mode, controller.fault());
                 }
-                mode => eprintln!("controller: {mode}"),
+                mode => say!("controller: {mode}"),
             }
         }
     }
@@ -158,7 +159,7 @@ impl Shell {
     /// Counts a sample, and whether it was answered within its period.
     fn answered(&mut self, at: SystemTime) {
         if self.heard.is_none() {
-            eprintln!("controller: the drives are present");
+            say!("controller: the drives are present");
         }
         self.heard = Some(Instant::now());
         self.counts.feedback += 1;
@@ -173,7 +174,7 @@ impl Shell {
     fn report_silence(&mut self) {
         if self.heard.is_some_and(|heard| heard.elapsed() > SILENCE) {
             self.heard = None;
-            eprintln!(
+            say!(
                 "controller: the drives are silent; waiting for them on {}",
                 self.bus
             );

@@ -3,12 +3,11 @@
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Exit code of a program that has run into a fault of its own (`EX_SOFTWARE` of sysexits.h).
-pub const OWN_FAULT: u8 = 70;
+use crate::OWN_FAULT;
 
-/// Does `work`, which returns the exit code. Should it panic, the person at the terminal gets one line with what a report
+/// Does the `work` of a program of this name and version, which returns the exit code. Should it panic, the person at the terminal gets one line with what a report
 /// needs, files under construction are removed as the stack unwinds, and the code is [`OWN_FAULT`].
-pub fn guard(work: impl FnOnce() -> u8) -> u8 {
+pub fn guard(program: &'static str, version: &'static str, work: impl FnOnce() -> u8) -> u8 {
     let backtrace = std::env::var_os("RUST_BACKTRACE").is_some();
     let default = panic::take_hook();
     let reported = AtomicBool::new(false);
@@ -19,13 +18,13 @@ pub fn guard(work: impl FnOnce() -> u8) -> u8 {
         }
         // A panic in a thread makes the one that waits for it panic as well.
         if !reported.swap(true, Ordering::Relaxed) {
-            crate::say!("{}", report(fault));
+            crate::say!("{program}: {}", report(version, fault));
         }
     }));
     panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or(OWN_FAULT)
 }
 
-fn report(fault: &PanicHookInfo<'_>) -> String {
+fn report(version: &str, fault: &PanicHookInfo<'_>) -> String {
     let payload = fault.payload();
     let what = payload
         .downcast_ref::<String>()
@@ -38,9 +37,8 @@ fn report(fault: &PanicHookInfo<'_>) -> String {
         format!("{}:{}", place.file(), place.line())
     });
     format!(
-        "plant-sim: this is a fault of the program itself, version {}, at {place}: {}. Please report this line with the \
+        "this is a fault of the program itself, version {version}, at {place}: {}. Please report this line with the \
          command that you typed",
-        env!("VERSION_AND_COMMIT"),
         what.join(" ")
     )
 }
