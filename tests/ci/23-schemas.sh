@@ -34,12 +34,20 @@ for run in run robots fault nothing; do
     validate scenario "$work/$run.toml"
 done
 
-echo "- statistics of a trace with an error frame, a robot for the controller, a plan"
+echo "- statistics of a trace with an error frame, and its records decoded, a robot for the controller, a plan"
 cat "$work/run/trace.log" - >"$work/errors.log" <<'END'
 (99.000000) can0 20000004#0001000000000000
 END
 "$plant_sim" trace stats --json "$work/errors.log" >"$work/statistics.json"
 validate statistics "$work/statistics.json"
+{
+    head -n 3000 "$work/run/trace.log"
+    echo '(98.000000) can0 123#1122'
+    tail -n 1 "$work/errors.log"
+} >"$work/some.log"
+"$plant_sim" trace decode --format jsonl "$work/some.log" >"$work/decoded.jsonl"
+[ "$(wc -l <"$work/decoded.jsonl")" = 3002 ] || fail "not every record is a line"
+validate decoded "$work/decoded.jsonl"
 "$plant_sim" model >"$work/controller-model.json"
 validate controller-model "$work/controller-model.json"
 "$plant_sim" check pick-place --json >"$work/plan.json"
@@ -57,5 +65,7 @@ sed 's/"mass": 11.5/"mass": -11.5/' plant-sim/models/irb930-22-1.05.json >"$work
 refused 'links' validate model "$work/wrong.json"
 sed 's/^cycles = .*/cycles = 0/' plant-sim/scenarios/gate.toml >"$work/wrong.toml"
 refused 'cycles' validate scenario "$work/wrong.toml"
+sed '3s/"time_s"/"time"/' "$work/decoded.jsonl" >"$work/wrong.jsonl"
+refused 'jsonl:3' validate decoded "$work/wrong.jsonl"
 sed 's/"at_rest"/"at_ease"/' "$work/run/summary.json" >"$work/wrong.json"
 refused 'at_rest' validate summary "$work/wrong.json"

@@ -1,4 +1,4 @@
-"""Holds files (JSON or TOML) against a JSON schema: schema.py SCHEMA FILE...
+"""Holds files (JSON, JSON Lines or TOML) against a JSON schema: schema.py SCHEMA FILE...
 
 Objects may have no key that the schema does not name: what is not described would otherwise go unseen.
 """
@@ -22,12 +22,18 @@ def closed(schema):
     return result
 
 
-def read(path):
+def documents(path):
+    """The documents of a file, each with its place."""
     if path.endswith(".toml"):
         with open(path, "rb") as file:
-            return tomllib.load(file)
+            yield path, tomllib.load(file)
+        return
     with open(path, encoding="utf-8") as file:
-        return json.load(file)
+        if path.endswith(".jsonl"):
+            for number, line in enumerate(file, 1):
+                yield f"{path}:{number}", json.loads(line)
+        else:
+            yield path, json.load(file)
 
 
 def main():
@@ -37,10 +43,11 @@ def main():
     validator = Draft202012Validator(closed(schema))
     bad = False
     for path in sys.argv[2:]:
-        for error in validator.iter_errors(read(path)):
-            bad = True
-            place = "/".join(str(word) for word in error.absolute_path)
-            print(f"{path}: {place}: {error.message[:300]}", file=sys.stderr)
+        for name, document in documents(path):
+            for error in validator.iter_errors(document):
+                bad = True
+                place = "/".join(str(word) for word in error.absolute_path)
+                print(f"{name}: {place}: {error.message[:300]}", file=sys.stderr)
     sys.exit(bad)
 
 

@@ -12,6 +12,7 @@ use sim::model::RobotModel;
 use sim::model::file::{ModelFile, PayloadFile};
 use sim::rehearsal::Plan;
 use sim::scenario::Scenario;
+use trace::decode::JsonLine;
 use trace::stats::Statistics;
 
 use super::cost::Report;
@@ -41,6 +42,8 @@ enum Name {
     Summary,
     /// trace stats --json.
     Statistics,
+    /// trace decode --format jsonl: one object on a line.
+    Decoded,
     /// parameters --json.
     Parameters,
     /// check --json.
@@ -63,6 +66,7 @@ impl Name {
             Self::Payload => of_input::<PayloadFile>(),
             Self::Summary => of_output::<Results>(),
             Self::Statistics => of_output::<Statistics>(),
+            Self::Decoded => of_output::<JsonLine>(),
             Self::Parameters => of_output::<Vec<Row>>(),
             Self::Plan => of_output::<Plan>(),
             Self::Cost => of_output::<Report>(),

@@ -1,5 +1,7 @@
 //! Decoded traces: a line of text per frame, a CSV row per field, or a JSON object per frame.
 
+mod line;
+
 use std::io::{self, Write};
 
 use protocol::codec::DecodeError;
@@ -9,6 +11,8 @@ use serde_json::Value as Json;
 
 use super::fields::{Decoded, Field, Value, full_name};
 use super::{Entry, ErrorFrame, Record};
+
+pub use line::{JsonField, JsonLine, JsonValue};
 
 /// Format of a decoded trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
