@@ -86,11 +86,25 @@ pub fn payload(path: &Path) -> Result<Payload, InputError> {
     Payload::from_json(&text(path)?).map_err(|source| in_file(path, source))
 }
 
+/// The text of a file, without the mark that some editors put before UTF-8.
 fn text(path: &Path) -> Result<String, InputError> {
-    std::fs::read_to_string(path).map_err(|source| InputError::Read {
-        path: path.into(),
-        source,
-    })
+    std::fs::read(path)
+        .and_then(|bytes| {
+            let wrong = |what| io::Error::new(io::ErrorKind::InvalidData, what);
+            if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
+                return Err(wrong("it is UTF-16; save it as UTF-8"));
+            }
+            let text = String::from_utf8(bytes)
+                .map_err(|_| wrong("it is no text; allowed: text in UTF-8"))?;
+            Ok(text
+                .strip_prefix('\u{FEFF}')
+                .map(str::to_owned)
+                .unwrap_or(text))
+        })
+        .map_err(|source| InputError::Read {
+            path: path.into(),
+            source,
+        })
 }
 
 fn in_file(path: &Path, source: ModelError) -> InputError {
@@ -103,6 +117,25 @@ fn in_file(path: &Path, source: ModelError) -> InputError {
 #[cfg(test)]
 mod tests {
     use super::{payload, robot, scenario};
+
+    #[test]
+    fn text_of_other_systems_is_read_or_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("robot.json");
+        let name = file.to_str().unwrap();
+        let robot_text = include_str!("../models/irb930-22-1.05.json");
+        std::fs::write(&file, format!("\u{FEFF}{robot_text}")).unwrap();
+        assert!(robot(name).is_ok());
+        let units = robot_text.encode_utf16().flat_map(u16::to_le_bytes);
+        std::fs::write(
+            &file,
+            [0xFF, 0xFE].into_iter().chain(units).collect::<Vec<u8>>(),
+        )
+        .unwrap();
+        assert!(robot(name).unwrap_err().to_string().contains("UTF-16"));
+        std::fs::write(&file, b"\x80").unwrap();
+        assert!(robot(name).unwrap_err().to_string().contains("UTF-8"));
+    }
 
     #[test]
     fn what_is_not_there_is_named_with_what_is() {

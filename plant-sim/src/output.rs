@@ -68,6 +68,13 @@ impl File {
     /// # Errors
     /// Its folder does not accept files.
     pub fn create(path: &Path) -> Result<Self, OutputError> {
+        if path == Path::new("-") {
+            return Err(OutputError::Taken {
+                path: path.into(),
+                what: "no name for a file here",
+                hint: "leave the option out to write to standard output",
+            });
+        }
         let place = match fs::metadata(path).map(|there| there.file_type()) {
             Ok(there) if there.is_file() => {
                 fs::canonicalize(path).map_err(OutputError::at(path))?

@@ -11,7 +11,7 @@
 use std::fs;
 use std::process::{Command, Output, exit};
 
-use plant_sim::guard::guard;
+use terminal::guard;
 
 /// Set in the process that has to panic.
 const PANICS: &str = "PLANT_SIM_TEST_PANICS";
@@ -112,6 +112,14 @@ fn wrong_usage_or_input_is_2() {
         &["run", "--set", "gains.bandwidth=1e9"],
         &["run", "--set", "start=[-0.5, -0.5, -0.2, 0.0]"],
         &["run", "--image", "image.elf"],
+        &["run", "--image", "empty.log"],
+        &["run", "--seed", "-1"],
+        &["run", "--payload", "2kg"],
+        &["eval", "dynamics", "--elbow", "positive"],
+        &["eval", "ik", "--turn", "9"],
+        &["cost", "--image", "image.elf"],
+        &["dbc", "--out", "-"],
+        &["trace", "plot", "bad.log", "--out", "plot.png"],
         &["run", "--channel", "uart"],
         &["run", "--out", "empty.log"],
         &["run", "--out", "/dev/null"],
@@ -134,7 +142,7 @@ fn nothing_judged_is_3() {
 #[test]
 fn a_fault_of_our_own_is_70_and_one_line_for_a_report() {
     if std::env::var_os(PANICS).is_some() {
-        exit(guard(|| panic!("two\nlines")).into());
+        exit(guard("plant-sim", "1.2.3", || panic!("two\nlines")).into());
     }
     let output = Command::new(std::env::current_exe().unwrap())
         .args([
@@ -150,7 +158,7 @@ fn a_fault_of_our_own_is_70_and_one_line_for_a_report() {
     assert_eq!(output.status.code(), Some(70), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
     for word in [
-        "fault of the program",
+        "plant-sim: this is a fault of the program itself, version 1.2.3, at ",
         "exit_codes.rs",
         "two lines",
         "report",

@@ -16,6 +16,7 @@ use sim::run::with_controller;
 use sim::selection::LawChoice;
 use sim::setup::RunConfig;
 
+use super::values::image;
 use super::{Failure, show};
 
 /// Arguments of `cost`.
@@ -32,10 +33,10 @@ pub(super) struct CostArgs {
     )]
     law: LawChoice,
     /// The image of the controller, instead of the one built from the sources.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = image)]
     image: Option<PathBuf>,
     /// The image that measures phases, instead of the one built from the sources.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = image)]
     cost_image: Option<PathBuf>,
     /// Print the figures as JSON.
     #[arg(long)]

@@ -9,13 +9,14 @@ use plant_sim::input;
 use plant_sim::qemu;
 use sim::setup::RunConfig;
 
+use super::values::image;
 use super::{Failure, show};
 
 /// Arguments of `crash`.
 #[derive(Args)]
 pub(super) struct CrashArgs {
     /// The image, instead of the one built from the sources; it must be one that plants faults.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = image)]
     image: Option<PathBuf>,
 }
 

@@ -20,6 +20,7 @@ mod run;
 mod schema;
 mod timing;
 mod trace;
+mod values;
 mod what_if;
 
 use std::io::{self, Write as _};

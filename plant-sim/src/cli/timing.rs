@@ -9,6 +9,7 @@ use plant_sim::external::{histogram, measure};
 use plant_sim::output;
 use sim::scenario;
 
+use super::values::number;
 use super::{Failure, show};
 
 /// Arguments of `timing`.
@@ -19,7 +20,7 @@ pub(super) struct TimingArgs {
     #[arg(long, value_name = "BUS")]
     bus: LinkAddress,
     /// Sampling rate.
-    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true, value_parser = number)]
     rate: f64,
     /// Duration.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=86_400))]

@@ -115,30 +115,38 @@ pub(super) fn parse(line: &[u8]) -> Result<Record, Problem> {
     let time_us = timestamp(stamp)?;
 
     // candump aligns names of several interfaces with blanks.
-    let rest = rest.strip_prefix(b" ").ok_or(Problem::Interface)?;
-    let rest = rest.trim_ascii_start();
-    let (name, rest) = split_at_byte(rest, b' ').ok_or(Problem::Interface)?;
+    let (b"", rest) = split_at_blanks(rest).ok_or(Problem::Interface)? else {
+        return Err(Problem::Interface);
+    };
+    let (name, rest) = split_at_blanks(rest).ok_or(Problem::Interface)?;
     let interface = Interface::from_bytes(name).ok_or(Problem::Interface)?;
 
     let column = line.len() - rest.len() + 1;
     let rest = rest.trim_ascii_end();
-    let (frame, direction) = split_at_byte(rest, b' ').map_or((rest, None), |(f, d)| (f, Some(d)));
-    let direction = match direction {
-        None => None,
-        Some(b"R") => Some(Direction::Received),
-        Some(b"T") => Some(Direction::Transmitted),
-        Some(_) => return Err(Problem::Trailing),
-    };
+    let (frame, direction) = split_at_blanks(rest).unwrap_or((rest, b""));
     let entry = entry(Text {
         bytes: frame,
         column,
     })?;
+    let direction = match direction {
+        b"" => None,
+        b"R" => Some(Direction::Received),
+        b"T" => Some(Direction::Transmitted),
+        _ => return Err(Problem::Trailing),
+    };
     Ok(Record {
         time_us,
         interface,
         direction,
         entry,
     })
+}
+
+/// What is before the first blanks and what is after them.
+fn split_at_blanks(text: &[u8]) -> Option<(&[u8], &[u8])> {
+    let at = text.iter().position(u8::is_ascii_whitespace)?;
+    let (before, after) = text.split_at(at);
+    Some((before, after.trim_ascii_start()))
 }
 
 /// Microseconds of `seconds.decimals`; finer digits are cut off.

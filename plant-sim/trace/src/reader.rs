@@ -100,6 +100,11 @@ impl<R: BufRead> Reader<R> {
                 io::ErrorKind::InvalidData,
                 "Vector BLF, which is not read; python-can converts it: python3 -m can.logconvert FILE.blf OUT.log",
             ));
+        } else if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "text in UTF-16, as PowerShell writes it with >; convert it: iconv -f UTF-16 -t UTF-8 FILE > OUT",
+            ));
         } else {
             Format::Candump
         })

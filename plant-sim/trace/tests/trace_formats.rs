@@ -353,6 +353,7 @@ fn a_selection_takes_identifiers_interfaces_and_times() {
 fn what_is_not_read_is_named_with_its_converter() {
     for (bytes, tool) in [
         (&b"LOGG\x90\0\0\0"[..], "can.logconvert"),
+        (&b"\xFF\xFE(\x001\0.\0"[..], "iconv -f UTF-16"),
         (b"\xD4\xC3\xB2\xA1\x02\0\x04\0", "editcap -F pcapng"),
     ] {
         let Some(Err(ReadError::Io { source, .. })) = Reader::new(bytes).next() else {

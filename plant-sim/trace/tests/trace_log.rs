@@ -122,12 +122,13 @@ fn lines_of_other_tools_are_read() {
     for line in [
         "(1.500000) can0 123#ABCD\n",                      // python-can
         "(0000000001.500000)   can0 123#ABCD\n",           // several interfaces, aligned
-        "(0000000001.500000) can0 123#abcd\n",             // lower case
-        "(1.5) can0 123#ABCD\n",                           // fewer decimals
-        "(1.500000999) can0 123#ABCD\n",                   // nanoseconds, which are cut off
-        "(1.500000) can0 123#ABCD\r\n",                    // line end of another system
-        "(1.500000) can0 123#ABCD",                        // no line end at the end of the file
-        "\u{feff}(1.500000) can0 123#ABCD\n",              // byte order mark
+        "(1.500000)\tcan0\t 123#ABCD\n", // tabs and blanks of a hand or of a table
+        "(0000000001.500000) can0 123#abcd\n", // lower case
+        "(1.5) can0 123#ABCD\n",         // fewer decimals
+        "(1.500000999) can0 123#ABCD\n", // nanoseconds, which are cut off
+        "(1.500000) can0 123#ABCD\r\n",  // line end of another system
+        "(1.500000) can0 123#ABCD",      // no line end at the end of the file
+        "\u{feff}(1.500000) can0 123#ABCD\n", // byte order mark
         "# two cycles\n\n \r\n(1.500000) can0 123#ABCD\n", // comment and empty lines
     ] {
         assert_eq!(read(line.as_bytes()), Ok(plain), "{line}");

@@ -10,6 +10,7 @@ use sim::selection::LawChoice;
 use sim::setup::RunConfig;
 
 use crate::cli::Failure;
+use crate::cli::values::{number, whole};
 
 /// Options that change a scenario and choose robots.
 #[derive(Args, Clone)]
@@ -22,21 +23,21 @@ pub(crate) struct ConfigArgs {
     #[arg(long, value_name = "NAME")]
     law: Option<LawChoice>,
     /// Payload, announced and carried from the start; in a scenario that picks, what it picks.
-    #[arg(long, value_name = "KG")]
+    #[arg(long, value_name = "KG", allow_negative_numbers = true, value_parser = number)]
     payload: Option<f64>,
     /// Number of cycles. Short for --set cycles=N.
-    #[arg(long, value_name = "N")]
-    cycles: Option<u32>,
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole)]
+    cycles: Option<i64>,
     /// Control rate. Short for --set rate_hz=HZ.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = number)]
     rate: Option<f64>,
     /// Break something: PLACE[:AXIS]:KIND[=VALUE]@FROM[..UNTIL], such as encoder:elbow:stuck@0.4s or
     /// command:loss=0.2@0.3s..0.5s. May be repeated; docs/faults.md lists the kinds.
     #[arg(long, value_name = "FAULT")]
     fault: Vec<Fault>,
     /// Seed of whatever is random in the faults. Short for --set seed=N.
-    #[arg(long, value_name = "N")]
-    seed: Option<u32>,
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole)]
+    seed: Option<i64>,
     /// The robot as the controller knows it: irb930-22-1.05 (the default), irb930-12-0.85 or a model file; also the actual
     /// one, unless --plant-model is given. Configure an external controller the same way: plant-sim model NAME|FILE.
     #[arg(long, value_name = "NAME|FILE")]

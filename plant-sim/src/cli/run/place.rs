@@ -8,6 +8,7 @@ use link::{AddressError, LinkAddress, SlcanPeer};
 use plant_sim::qemu::{self, Channel};
 
 use crate::cli::Failure;
+use crate::cli::values::image;
 
 /// Options that say where the controller is.
 #[derive(Args, Clone)]
@@ -26,7 +27,7 @@ pub(super) struct PlaceArgs {
     #[arg(long, value_name = "WHERE", default_value = "in-process")]
     controller: ControllerChoice,
     /// The image for --controller qemu, instead of the one built from the sources.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = image)]
     image: Option<PathBuf>,
     /// How frames reach the controller in QEMU: as records (fifo, fast, the default), or as slcan over its UART.
     #[arg(long, value_name = "CHANNEL")]

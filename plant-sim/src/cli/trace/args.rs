@@ -11,6 +11,7 @@ use trace::convert::Target;
 use trace::select::{Ids, Moment, Selection};
 
 use crate::cli::bitrate::bit_timing;
+use crate::cli::values::number;
 
 /// A trace, and a selection of its records.
 #[derive(Args)]
@@ -24,7 +25,7 @@ pub(crate) struct InputArgs {
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = interface)]
     interface: Vec<Interface>,
     /// Only from this time on: seconds as in the trace, or after its first record (+12.5).
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     from: Option<Moment>,
 }
 
@@ -43,7 +44,7 @@ impl InputArgs {
 #[derive(Args)]
 pub(crate) struct EndArgs {
     /// Only up to this time: seconds as in the trace, or after its first record (+12.5).
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub to: Option<Moment>,
 }
 
@@ -101,7 +102,7 @@ pub(crate) struct StatsArgs {
     #[arg(long, value_name = "N[,D]", default_value = "1M,5M", value_parser = bit_timing)]
     pub bitrate: BitTiming,
     /// Leave out gaps without records longer than this, as when a clock was set.
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = seconds)]
     pub skip_gaps: Option<Duration>,
     /// Draw the distribution of the periods of each identifier.
     #[arg(long, conflicts_with = "json")]
@@ -122,8 +123,19 @@ pub(crate) struct PlotArgs {
     #[arg(long, value_name = "NAME|FILE")]
     pub model: Option<String>,
     /// Write to this file instead of standard output.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = svg)]
     pub out: Option<PathBuf>,
+}
+
+/// A file for an SVG: under another picture's name no program would show it.
+fn svg(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension() {
+        Some(other) if !other.eq_ignore_ascii_case("svg") => {
+            Err("the plot is an SVG; allowed: a name that ends in .svg".into())
+        }
+        _ => Ok(path),
+    }
 }
 
 /// Arguments of `check`.
@@ -156,6 +168,8 @@ pub(crate) struct ReplayArgs {
         long,
         value_name = "HZ",
         default_value_t = 1000.0,
+        allow_negative_numbers = true,
+        value_parser = number,
         conflicts_with = "bus"
     )]
     pub rate: f64,
@@ -170,7 +184,7 @@ pub(crate) struct ReplayArgs {
     #[arg(long, value_name = "X", default_value_t = 1.0, requires = "bus", allow_negative_numbers = true, value_parser = speed)]
     pub speed: f64,
     /// Skip recorded gaps without records longer than this.
-    #[arg(long, value_name = "S", requires = "bus", value_parser = seconds)]
+    #[arg(long, value_name = "S", requires = "bus", allow_negative_numbers = true, value_parser = seconds)]
     pub skip_gaps: Option<Duration>,
 }
 

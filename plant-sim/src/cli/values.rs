@@ -1,0 +1,23 @@
+//! Values that several subcommands take.
+
+use std::path::{Path, PathBuf};
+
+/// Any number; what it may be is checked where it is used.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "allowed: a number".into())
+}
+
+/// Any whole number; what it may be is checked where it is used.
+pub(super) fn whole(text: &str) -> Result<i64, String> {
+    text.parse().map_err(|_| "allowed: a whole number".into())
+}
+
+/// The image of a controller.
+pub(super) fn image(text: &str) -> Result<PathBuf, String> {
+    let path = Path::new(text);
+    if path.is_file() {
+        Ok(path.into())
+    } else {
+        Err("there is no such file; allowed: the ELF file of the board's program".into())
+    }
+}
