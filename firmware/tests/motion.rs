@@ -9,17 +9,16 @@
     reason = "a test fails by panicking"
 )]
 
-use firmware::mechanics::arm::{ArmModel, IRB_930, Payload};
+mod common;
+
+use common::planned::{check, joints, plan, two_kg};
+use firmware::mechanics::arm::{IRB_930, Payload};
 use firmware::mechanics::body::Body;
-use firmware::mechanics::dynamics::newton_euler;
 use firmware::mechanics::kinematics::{self, Pose};
-use firmware::trajectory::Trajectory;
-use firmware::trajectory::planner::Planner;
-use firmware::trajectory::request::{Request, Target};
-use firmware::trajectory::torque_budget::TorqueBudget;
+use firmware::trajectory::request::Target;
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
-use protocol::messages::{ElbowSide, Posture, Refusal, RefusalReason, WristTurn};
+use protocol::messages::{Posture, RefusalReason};
 
 const GATE_A: Pose = Pose {
     x: 0.493_934,
@@ -33,115 +32,6 @@ const GATE_B: Pose = Pose {
     z: -0.2713,
     yaw: 0.0,
 };
-
-fn two_kg() -> Payload {
-    Payload {
-        mass: 2.0,
-        com: Vector3::new(0.0, 0.0, 0.05),
-        inertia: Vector3::new(0.008, 0.008, 0.01),
-    }
-}
-
-/// Plans to the end within a bounded number of ticks.
-fn plan(
-    arm: &ArmModel,
-    payload: &Payload,
-    from: &Vector4<f32>,
-    target: Target,
-    speed: f32,
-) -> Result<Trajectory, Refusal> {
-    let body = Body::new(arm, payload);
-    let budget = TorqueBudget { arm, body: &body };
-    let mut planner = Planner::new();
-    planner.begin(
-        &Request {
-            sequence: 1,
-            target,
-            speed,
-        },
-        from,
-    );
-    for _ in 0..Planner::MAX_STEPS {
-        if let Some(result) = planner.work(&budget) {
-            return result.map(|()| *planner.trajectory());
-        }
-    }
-    panic!("not planned within {} steps", Planner::MAX_STEPS)
-}
-
-/// Walks a trajectory and checks every sample against every limit.
-///
-/// The samples are eight times as dense as the planner's, so any excess between two of its samples shows here: it must
-/// stay within the planner's margin.
-fn check(arm: &ArmModel, payload: &Payload, trajectory: &Trajectory) -> Result<(), TestCaseError> {
-    let body = Body::new(arm, payload);
-    let duration = trajectory.duration();
-    let steps = 800;
-    let slack = 1.0 + 1e-3;
-    let mut previous: Option<(Vector4<f32>, Vector4<f32>)> = None;
-    for i in 0..=steps {
-        let t = duration * i as f32 / steps as f32;
-        let r = trajectory
-            .at(arm, t)
-            .expect("a planned path stays in reach");
-        let torque = newton_euler::inverse(arm, payload, &r.q, &r.qd, &r.qdd)
-            + body.drive.rotor_inertia() * r.qdd
-            + body.drive.friction(&r.qd);
-        let motor = body.drive.motor_torque(&torque);
-        for axis in 0..4 {
-            let limits = &arm.limits;
-            prop_assert!(
-                r.q[axis] >= limits.lower[axis] - 1e-5 && r.q[axis] <= limits.upper[axis] + 1e-5
-            );
-            prop_assert!(
-                r.qd[axis].abs() <= limits.velocity[axis] * slack,
-                "speed {axis} {}",
-                r.qd[axis]
-            );
-            prop_assert!(
-                r.qdd[axis].abs() <= limits.acceleration[axis] * slack,
-                "acceleration {axis} {}",
-                r.qdd[axis]
-            );
-            prop_assert!(
-                torque[axis].abs() <= limits.effort[axis],
-                "effort {axis} {}",
-                torque[axis]
-            );
-            prop_assert!(
-                motor[axis].abs() <= arm.drive.motor_torque_limit[axis],
-                "motor {axis} {}",
-                motor[axis]
-            );
-        }
-        // Positions, speeds and accelerations are consistent: no jump between two samples.
-        if let Some((before, acceleration)) = previous {
-            let h = duration / steps as f32;
-            for axis in 0..4 {
-                let bound = arm.limits.velocity[axis] * h * slack + 1e-5;
-                prop_assert!((r.q[axis] - before[axis]).abs() <= bound);
-                // Jerk by differences: along a line the reference omits a part of it.
-                // f32 accelerations of up to 600 rad/s^2, each off by some 20 u.
-                let jerk = (r.qdd[axis] - acceleration[axis]).abs() / h;
-                let noise = 20.0 * f32::EPSILON * arm.limits.acceleration[axis] / h;
-                prop_assert!(
-                    jerk <= arm.limits.jerk[axis] * slack + noise,
-                    "jerk {axis} {jerk}"
-                );
-            }
-        }
-        previous = Some((r.q, r.qdd));
-    }
-    let end = trajectory.at(arm, duration * 1.01).expect("in reach");
-    prop_assert!((end.q - trajectory.end).amax() < 1e-5);
-    prop_assert_eq!(end.qd, Vector4::zeros());
-    Ok(())
-}
-
-fn joints() -> impl Strategy<Value = Vector4<f32>> {
-    (-2.6f32..2.6, -2.5f32..2.5, 0.0f32..0.3, -6.9f32..6.9)
-        .prop_map(|(a, b, c, d)| Vector4::new(a, b, c, d))
-}
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(500))]
@@ -223,55 +113,6 @@ proptest! {
         );
     }
 
-    /// A jump ends at its pose, with the elbow at the side and the wrist in the turn that were asked for, or names the axis
-    /// that cannot.
-    #[test]
-    fn jumps_end_in_the_posture_asked_for(
-        from in joints(), to in joints(), rise in 0.0f32..0.1,
-        elbow in prop::sample::select(ElbowSide::ALL), turn in prop::sample::select(WristTurn::ALL),
-    ) {
-        // A stretched or folded arm has one posture, and f32 knows its elbow badly.
-        prop_assume!(to.y.abs() > 0.1 && from.y.abs() > 1e-3);
-        let pose = kinematics::forward(&IRB_930.geometry, &to);
-        let top = pose.z + rise;
-        let target = Target::Jump { pose, posture: Posture { elbow, turn }, top, clearance: 0.0 };
-        match plan(&IRB_930, &two_kg(), &from, target, 1.0) {
-            Ok(trajectory) => {
-                check(&IRB_930, &two_kg(), &trajectory)?;
-                let end = trajectory.end;
-                let positive = match elbow {
-                    ElbowSide::Keep => from.y > 0.0,
-                    ElbowSide::Positive => true,
-                    ElbowSide::Negative => false,
-                };
-                prop_assert_eq!(end.y > 0.0, positive);
-                if let Some(turn) = turn.number() {
-                    let revolutions = end.w / std::f32::consts::TAU;
-                    prop_assert!((revolutions - f32::from(turn)).abs() < 0.5 + 1e-5, "{revolutions} {turn}");
-                }
-                let there = kinematics::forward(&IRB_930.geometry, &end);
-                let off = (there.x - pose.x).hypot(there.y - pose.y).max((there.z - pose.z).abs());
-                prop_assert!(off < 1e-5, "{there:?} {pose:?}");
-                let turned = firmware::mechanics::math::wrap(there.yaw - pose.yaw);
-                prop_assert!(turned.abs() < 1e-4, "{there:?} {pose:?}");
-            }
-            Err(refusal) => {
-                let own = (to.y > 0.0, (to.w / std::f32::consts::TAU).round());
-                let same = match elbow {
-                    ElbowSide::Keep => from.y > 0.0,
-                    side => side == ElbowSide::Positive,
-                } == own.0;
-                let turn = turn.number().map(f32::from);
-                // The arm was there: at its side and in its turn only the heights can be in the way.
-                prop_assert!(
-                    !same || turn.is_some_and(|turn| turn != own.1) || refusal.axis == 2
-                        || refusal.reason == RefusalReason::TorqueTooSmall,
-                    "{refusal:?}"
-                );
-            }
-        }
-    }
-
     #[test]
     fn lines_are_straight_and_keep_every_limit(
         x0 in 0.4f32..0.8, y0 in -0.3f32..0.3, x1 in 0.4f32..0.8, y1 in -0.3f32..0.3,
@@ -294,39 +135,6 @@ proptest! {
             prop_assert!(aside < 2e-6, "{aside} aside");
         }
     }
-}
-
-/// A line keeps the side of its elbow, and turns the yaw as far as the turn of the wrist at its end wants.
-#[test]
-fn a_line_ends_in_the_turn_asked_for_and_at_its_side() {
-    let from = Vector4::new(-0.4, 1.2, 0.1, 0.5);
-    let end = Pose {
-        x: 0.7,
-        y: 0.2,
-        z: -0.25,
-        yaw: 1.0,
-    };
-    let line = |elbow, turn| {
-        let target = Target::Line(end, Posture { elbow, turn });
-        plan(&IRB_930, &two_kg(), &from, target, 1.0)
-    };
-    let plain = line(ElbowSide::Keep, WristTurn::Nearest).unwrap().end;
-    for (turn, number) in [
-        (WristTurn::Zero, 0.0),
-        (WristTurn::PlusOne, 1.0),
-        (WristTurn::MinusOne, -1.0),
-    ] {
-        let trajectory = line(ElbowSide::Positive, turn).unwrap();
-        check(&IRB_930, &two_kg(), &trajectory).unwrap();
-        let turned = trajectory.end.w - plain.w;
-        assert!((turned - number * std::f32::consts::TAU).abs() < 1e-5);
-        assert!((trajectory.end - plain).xyz().amax() < 1e-5);
-    }
-    let far = line(ElbowSide::Keep, WristTurn::PlusTwo).unwrap_err();
-    assert_eq!((far.reason, far.axis), (RefusalReason::JointLimit, 3));
-    assert!(far.value > far.limit, "{far:?}");
-    let other = line(ElbowSide::Negative, WristTurn::Nearest).unwrap_err();
-    assert_eq!(other.reason, RefusalReason::ElbowSide);
 }
 
 /// Analytic derivatives of a line against differences of its positions.

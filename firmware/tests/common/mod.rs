@@ -1,7 +1,8 @@
-//! Shared by the tests of the mathematics: random arms and positions, and units of error.
+//! Shared by the tests of mathematics and motion: random arms and positions, units of error, and plans.
 #![allow(dead_code)] // Each test binary uses its own part.
 
 pub(crate) mod magnitude;
+pub(crate) mod planned;
 
 use firmware::mechanics::arm::{ArmModel, Geometry, IRB_930, Link, Payload};
 use nalgebra::{Vector3, Vector4};

@@ -101,7 +101,7 @@ impl<'a> Findings<'a> {
 
     /// What the gripper holds from step to step. It begins a cycle with whatever it held at the end of the previous one.
     fn gripper(&mut self, carry: Allowed) {
-        let mut held = self.scenario.payload.filter(|payload| payload.mass > 0.0);
+        let mut held = self.scenario.payload.filter(|payload| payload.mass != 0.0);
         if let Some(payload) = held {
             self.number("payload.mass", payload.mass, carry);
         }

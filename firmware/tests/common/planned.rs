@@ -1,0 +1,126 @@
+//! Plans, and walks along them against the limits of the robot, judged by the recursive Newton-Euler dynamics, which the planner
+//! does not use.
+
+use firmware::mechanics::arm::{ArmModel, Payload};
+use firmware::mechanics::body::Body;
+use firmware::mechanics::dynamics::newton_euler;
+use firmware::trajectory::Trajectory;
+use firmware::trajectory::planner::Planner;
+use firmware::trajectory::request::{Request, Target};
+use firmware::trajectory::torque_budget::TorqueBudget;
+use nalgebra::{Vector3, Vector4};
+use proptest::prelude::*;
+use protocol::messages::Refusal;
+
+pub(crate) fn two_kg() -> Payload {
+    Payload {
+        mass: 2.0,
+        com: Vector3::new(0.0, 0.0, 0.05),
+        inertia: Vector3::new(0.008, 0.008, 0.01),
+    }
+}
+
+/// Plans to the end within a bounded number of ticks.
+pub(crate) fn plan(
+    arm: &ArmModel,
+    payload: &Payload,
+    from: &Vector4<f32>,
+    target: Target,
+    speed: f32,
+) -> Result<Trajectory, Refusal> {
+    let body = Body::new(arm, payload);
+    let budget = TorqueBudget { arm, body: &body };
+    let mut planner = Planner::new();
+    planner.begin(
+        &Request {
+            sequence: 1,
+            target,
+            speed,
+        },
+        from,
+    );
+    for _ in 0..Planner::MAX_STEPS {
+        if let Some(result) = planner.work(&budget) {
+            return result.map(|()| *planner.trajectory());
+        }
+    }
+    panic!("not planned within {} steps", Planner::MAX_STEPS)
+}
+
+/// Walks a trajectory and checks every sample against every limit.
+///
+/// The samples are eight times as dense as the planner's, so any excess between two of its samples shows here: it must
+/// stay within the planner's margin.
+pub(crate) fn check(
+    arm: &ArmModel,
+    payload: &Payload,
+    trajectory: &Trajectory,
+) -> Result<(), TestCaseError> {
+    let body = Body::new(arm, payload);
+    let duration = trajectory.duration();
+    let steps = 800;
+    let slack = 1.0 + 1e-3;
+    let mut previous: Option<(Vector4<f32>, Vector4<f32>)> = None;
+    for i in 0..=steps {
+        let t = duration * i as f32 / steps as f32;
+        let r = trajectory
+            .at(arm, t)
+            .expect("a planned path stays in reach");
+        let torque = newton_euler::inverse(arm, payload, &r.q, &r.qd, &r.qdd)
+            + body.drive.rotor_inertia() * r.qdd
+            + body.drive.friction(&r.qd);
+        let motor = body.drive.motor_torque(&torque);
+        for axis in 0..4 {
+            let limits = &arm.limits;
+            prop_assert!(
+                r.q[axis] >= limits.lower[axis] - 1e-5 && r.q[axis] <= limits.upper[axis] + 1e-5
+            );
+            prop_assert!(
+                r.qd[axis].abs() <= limits.velocity[axis] * slack,
+                "speed {axis} {}",
+                r.qd[axis]
+            );
+            prop_assert!(
+                r.qdd[axis].abs() <= limits.acceleration[axis] * slack,
+                "acceleration {axis} {}",
+                r.qdd[axis]
+            );
+            prop_assert!(
+                torque[axis].abs() <= limits.effort[axis],
+                "effort {axis} {}",
+                torque[axis]
+            );
+            prop_assert!(
+                motor[axis].abs() <= arm.drive.motor_torque_limit[axis],
+                "motor {axis} {}",
+                motor[axis]
+            );
+        }
+        // Positions, speeds and accelerations are consistent: no jump between two samples.
+        if let Some((before, acceleration)) = previous {
+            let h = duration / steps as f32;
+            for axis in 0..4 {
+                let bound = arm.limits.velocity[axis] * h * slack + 1e-5;
+                prop_assert!((r.q[axis] - before[axis]).abs() <= bound);
+                // Jerk by differences: along a line the reference omits a part of it.
+                // f32 accelerations of up to 600 rad/s^2, each off by some 20 u.
+                let jerk = (r.qdd[axis] - acceleration[axis]).abs() / h;
+                let noise = 20.0 * f32::EPSILON * arm.limits.acceleration[axis] / h;
+                prop_assert!(
+                    jerk <= arm.limits.jerk[axis] * slack + noise,
+                    "jerk {axis} {jerk}"
+                );
+            }
+        }
+        previous = Some((r.q, r.qdd));
+    }
+    let end = trajectory.at(arm, duration * 1.01).expect("in reach");
+    prop_assert!((end.q - trajectory.end).amax() < 1e-5);
+    prop_assert_eq!(end.qd, Vector4::zeros());
+    Ok(())
+}
+
+pub(crate) fn joints() -> impl Strategy<Value = Vector4<f32>> {
+    (-2.6f32..2.6, -2.5f32..2.5, 0.0f32..0.3, -6.9f32..6.9)
+        .prop_map(|(a, b, c, d)| Vector4::new(a, b, c, d))
+}

@@ -1,0 +1,105 @@
+//! Moves that say which joint positions of a pose they mean.
+
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
+mod common;
+
+use common::planned::{check, joints, plan, two_kg};
+use firmware::mechanics::arm::IRB_930;
+use firmware::mechanics::kinematics::{self, Pose};
+use firmware::trajectory::request::Target;
+use nalgebra::Vector4;
+use proptest::prelude::*;
+use protocol::messages::{ElbowSide, Posture, RefusalReason, WristTurn};
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    /// A jump ends at its pose, with the elbow at the side and the wrist in the turn that were asked for, or names the axis
+    /// that cannot.
+    #[test]
+    fn jumps_end_in_the_posture_asked_for(
+        from in joints(), to in joints(), rise in 0.0f32..0.1,
+        elbow in prop::sample::select(ElbowSide::ALL), turn in prop::sample::select(WristTurn::ALL),
+    ) {
+        // A stretched or folded arm has one posture, and f32 knows its elbow badly.
+        prop_assume!(to.y.abs() > 0.1 && from.y.abs() > 1e-3);
+        let pose = kinematics::forward(&IRB_930.geometry, &to);
+        let top = pose.z + rise;
+        let target = Target::Jump { pose, posture: Posture { elbow, turn }, top, clearance: 0.0 };
+        match plan(&IRB_930, &two_kg(), &from, target, 1.0) {
+            Ok(trajectory) => {
+                check(&IRB_930, &two_kg(), &trajectory)?;
+                let end = trajectory.end;
+                let positive = match elbow {
+                    ElbowSide::Keep => from.y > 0.0,
+                    ElbowSide::Positive => true,
+                    ElbowSide::Negative => false,
+                };
+                prop_assert_eq!(end.y > 0.0, positive);
+                if let Some(turn) = turn.number() {
+                    let revolutions = end.w / std::f32::consts::TAU;
+                    prop_assert!((revolutions - f32::from(turn)).abs() < 0.5 + 1e-5, "{revolutions} {turn}");
+                }
+                let there = kinematics::forward(&IRB_930.geometry, &end);
+                let off = (there.x - pose.x).hypot(there.y - pose.y).max((there.z - pose.z).abs());
+                prop_assert!(off < 1e-5, "{there:?} {pose:?}");
+                let turned = firmware::mechanics::math::wrap(there.yaw - pose.yaw);
+                prop_assert!(turned.abs() < 1e-4, "{there:?} {pose:?}");
+            }
+            Err(refusal) => {
+                let own = (to.y > 0.0, (to.w / std::f32::consts::TAU).round());
+                let same = match elbow {
+                    ElbowSide::Keep => from.y > 0.0,
+                    side => side == ElbowSide::Positive,
+                } == own.0;
+                let turn = turn.number().map(f32::from);
+                // The arm was there: at its side and in its turn only the heights can be in the way.
+                prop_assert!(
+                    !same || turn.is_some_and(|turn| turn != own.1) || refusal.axis == 2
+                        || refusal.reason == RefusalReason::TorqueTooSmall,
+                    "{refusal:?}"
+                );
+            }
+        }
+    }
+}
+
+/// A line keeps the side of its elbow, and turns the yaw as far as the turn of the wrist at its end wants.
+#[test]
+fn a_line_ends_in_the_turn_asked_for_and_at_its_side() {
+    let from = Vector4::new(-0.4, 1.2, 0.1, 0.5);
+    let end = Pose {
+        x: 0.7,
+        y: 0.2,
+        z: -0.25,
+        yaw: 1.0,
+    };
+    let line = |elbow, turn| {
+        let target = Target::Line(end, Posture { elbow, turn });
+        plan(&IRB_930, &two_kg(), &from, target, 1.0)
+    };
+    let plain = line(ElbowSide::Keep, WristTurn::Nearest).unwrap().end;
+    for (turn, number) in [
+        (WristTurn::Zero, 0.0),
+        (WristTurn::PlusOne, 1.0),
+        (WristTurn::MinusOne, -1.0),
+    ] {
+        let trajectory = line(ElbowSide::Positive, turn).unwrap();
+        check(&IRB_930, &two_kg(), &trajectory).unwrap();
+        let turned = trajectory.end.w - plain.w;
+        assert!((turned - number * std::f32::consts::TAU).abs() < 1e-5);
+        assert!((trajectory.end - plain).xyz().amax() < 1e-5);
+    }
+    let far = line(ElbowSide::Keep, WristTurn::PlusTwo).unwrap_err();
+    assert_eq!((far.reason, far.axis), (RefusalReason::JointLimit, 3));
+    assert!(far.value > far.limit, "{far:?}");
+    let other = line(ElbowSide::Negative, WristTurn::Nearest).unwrap_err();
+    assert_eq!(other.reason, RefusalReason::ElbowSide);
+}
