@@ -164,6 +164,9 @@ proptest! {
             let wrapped = wrap(x);
             prop_assert!(-std::f32::consts::PI < wrapped && wrapped <= std::f32::consts::PI);
             prop_assert_eq!(wrap(wrapped).to_bits(), wrapped.to_bits());
+            if x.abs() > 8192.0 {
+                prop_assert_eq!(wrapped.to_bits(), wrap(x % std::f32::consts::TAU).to_bits());
+            }
             prop_assert_eq!(tanh(-x).to_bits(), (-tanh(x)).to_bits());
             prop_assert!(tanh(x).abs() <= 1.0);
         } else {

@@ -29,8 +29,34 @@ fn fold(angle: f32) -> f32 {
     if angle.abs() <= REDUCTION_RANGE {
         angle
     } else {
-        libm::fmodf(angle, TAU)
+        without_turns(angle)
     }
+}
+
+/// Remainder of an angle beyond one turn, with its sign: exact, by long division of the mantissas. NaN for an infinity or NaN.
+///
+/// At most 126 steps. `libm::fmodf` divides 64-bit integers in software, which costs an image a kilobyte.
+#[inline(never)]
+fn without_turns(angle: f32) -> f32 {
+    const FRACTION: u32 = f32::MANTISSA_DIGITS - 1;
+    const HIDDEN: u32 = 1 << FRACTION;
+    let mantissa = |x: f32| x.to_bits() & (HIDDEN - 1) | HIDDEN;
+    let exponent = |x: f32| x.to_bits() << 1 >> (FRACTION + 1);
+    if !angle.is_finite() {
+        return f32::NAN;
+    }
+    let turn = mantissa(TAU);
+    let mut rest = mantissa(angle);
+    for step in exponent(TAU)..=exponent(angle) {
+        if step != exponent(TAU) {
+            rest <<= 1;
+        }
+        if rest >= turn {
+            rest -= turn;
+        }
+    }
+    // The unit of TAU's last place: 2^(2 - 23).
+    (rest as f32 * (4.0 / HIDDEN as f32)).copysign(angle)
 }
 
 /// Subtracts `count` times a period given in three parts.
