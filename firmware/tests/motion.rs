@@ -293,3 +293,63 @@ fn refusals_name_axis_value_and_limit() {
         (RefusalReason::TorqueTooSmall, 2)
     );
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    /// Of lines anywhere, many of which graze the inner limit of the elbow or turn the shoulder back: between the points that
+    /// planning looks at, too, no joint leaves its range by more than rounding; shoulder and wrist, whose turning points are not
+    /// looked for, by less than a milliradian.
+    #[test]
+    fn a_line_stays_inside_the_ranges_between_its_points(
+        r0 in 0.25f32..1.02, a0 in -3.1f32..3.1, r1 in 0.25f32..1.02, a1 in -3.1f32..3.1, yaw in -6.0f32..6.0,
+        positive in any::<bool>(),
+    ) {
+        let elbow = if positive { kinematics::Elbow::Positive } else { kinematics::Elbow::Negative };
+        let start = Pose { x: r0 * a0.cos(), y: r0 * a0.sin(), z: -0.2, yaw: 0.0 };
+        let end = Pose { x: r1 * a1.cos(), y: r1 * a1.sin(), z: -0.2, yaw };
+        let Ok(from) = kinematics::inverse(&IRB_930, &start, elbow, &Vector4::zeros()) else { return Ok(()) };
+        let Ok(trajectory) = plan(&IRB_930, &two_kg(), &from, Target::Line(end, Posture::NEAREST), 1.0) else { return Ok(()) };
+        let limits = &IRB_930.limits;
+        for i in 0..=4000 {
+            let t = trajectory.duration() * i as f32 / 4000.0;
+            let q = trajectory.at(&IRB_930, t).unwrap().q;
+            let past = (limits.lower - q).sup(&(q - limits.upper));
+            prop_assert!(past.y < 1e-5 && past.max() < 1e-3, "{past} past the limits at {q}");
+        }
+    }
+}
+
+/// A line whose nearest point to axis 1, between two points that planning looks at, bends the elbow 3 mrad too far.
+#[test]
+fn a_line_that_grazes_the_inner_limit_is_refused() {
+    let [start, end] = [-0.833_333_3, 0.766_666_7].map(|y| Pose {
+        x: 0.321_221_8,
+        y,
+        z: -0.25,
+        yaw: 0.0,
+    });
+    let from = kinematics::inverse(
+        &IRB_930,
+        &start,
+        kinematics::Elbow::Positive,
+        &Vector4::zeros(),
+    )
+    .unwrap();
+    let refusal = plan(
+        &IRB_930,
+        &two_kg(),
+        &from,
+        Target::Line(end, Posture::NEAREST),
+        1.0,
+    )
+    .unwrap_err();
+    assert_eq!(
+        (refusal.reason, refusal.axis),
+        (RefusalReason::JointLimit, 1)
+    );
+    assert!(
+        (refusal.value - refusal.limit - 3.1e-3).abs() < 2e-4,
+        "{refusal:?}"
+    );
+}

@@ -57,6 +57,17 @@ pub enum Path {
 }
 
 impl Path {
+    /// Where a line comes nearest to axis 1, if that is between its ends.
+    pub(super) fn nearest(&self) -> Option<f32> {
+        let Self::Line { start, delta, .. } = self else {
+            return None;
+        };
+        let squared = delta.x * delta.x + delta.y * delta.y;
+        let foot = -(start.x * delta.x + start.y * delta.y) / squared;
+        // Not a number where the tool moves straight up or down.
+        (foot > 0.0 && foot < 1.0).then_some(foot)
+    }
+
     /// Joint positions and derivatives at `s`.
     ///
     /// # Errors

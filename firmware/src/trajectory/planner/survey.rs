@@ -4,6 +4,7 @@ use nalgebra::Vector4;
 use protocol::messages::Refusal;
 
 use super::{Planner, SURVEY_POINTS, Stage, fill};
+use crate::mechanics::math::clamp;
 use crate::trajectory::path::{Path, PathPoint, check_limits};
 use crate::trajectory::profile::Sample;
 use crate::trajectory::request::from_ik;
@@ -23,7 +24,14 @@ impl Planner {
             Path::Joint { .. } => 1,
             Path::Line { .. } => SURVEY_POINTS,
         };
-        let s = f32::from(point) / f32::from(points);
+        let count = f32::from(points);
+        let mut s = f32::from(point) / count;
+        // Where it comes nearest to the base the arm is bent most: the point between the ends next to it moves there.
+        if let Some(nearest) = self.draft.path.nearest()
+            && point == clamp(nearest * count + 0.5, 1.0, count - 1.0) as u8
+        {
+            s = nearest;
+        }
         let here = self.point(budget.arm, s)?;
         // Until the plan is complete, this is where it starts.
         let from = &self.draft.end;
