@@ -205,6 +205,12 @@ impl Jacobian {
         }
     }
 
+    /// Whether [`Jacobian::joint_speed_damped`] differs from [`Jacobian::joint_speed`].
+    #[must_use]
+    pub fn is_damped(&self) -> bool {
+        self.damping_squared() > 0.0
+    }
+
     /// Joint speeds for a task velocity, damped near the stretched arm: defined everywhere, bounded, continuous.
     ///
     /// Damped least squares (Nakamura and Hanafusa 1986) on the planar block with a damping that grows towards the

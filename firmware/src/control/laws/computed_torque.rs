@@ -7,7 +7,7 @@
 use nalgebra::Vector4;
 use protocol::messages::Compensation;
 
-use super::{ControlInput, Gains, Memory};
+use super::{ControlInput, Gains, Memory, Motion};
 
 /// Joint torques.
 pub fn torque(
@@ -17,14 +17,18 @@ pub fn torque(
     memory: &mut Memory,
 ) -> Vector4<f32> {
     let motion = input.motion;
-    let error = motion.position_error();
-    let mut acceleration = motion.qdd_ahead
-        + motion.velocity_error() * gains.derivative()
-        + error * gains.proportional();
+    let mut acceleration = acceleration(motion, gains);
     if compensation == Compensation::Integral {
-        acceleration += memory.integrate(&error, motion) * gains.integral();
+        acceleration += memory.integrate(&motion.position_error(), motion) * gains.integral();
     }
     realise(input, &acceleration, gains, compensation, memory)
+}
+
+/// Joint accelerations of the reference, corrected by its errors.
+pub(super) fn acceleration(motion: &Motion<'_>, gains: &Gains) -> Vector4<f32> {
+    motion.qdd_ahead
+        + motion.velocity_error() * gains.derivative()
+        + motion.position_error() * gains.proportional()
 }
 
 /// The torques that give the joints `acceleration` against the modelled forces and, with the observer, the unmodelled

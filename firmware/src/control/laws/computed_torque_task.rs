@@ -2,8 +2,8 @@
 //! tau = M J^-1 [mu_d'' - J' qd + Kp (mu_d - mu) + Kd (mu_d' - mu')] + V + g, mu = (x, y, z, yaw).
 //!
 //! The paper prints J'(q_d) qd_d, which leaves up to 20 m/s² uncancelled off the path, and a 6x4
-//! Jacobian; here J' qd is that of the measured motion and J the 4x4 task Jacobian, inverted with
-//! damping near the stretched elbow.
+//! Jacobian; here J' qd is that of the measured motion and J the 4x4 task Jacobian. Near the stretched elbow its inverse
+//! is damped, and joint space fills in what the damping leaves out.
 
 use nalgebra::Vector4;
 use protocol::messages::Compensation;
@@ -25,6 +25,8 @@ pub fn torque(
     let desired =
         task.desired.task_velocity(&motion.qdd_ahead) + task.desired.bias(&motion.qd_ahead);
     let carried = task.actual.bias(&motion.measured_qd_ahead());
-    let acceleration = task.actual.joint_speed_damped(&(desired - carried + pull));
+    let acceleration = task.joint_space(&(desired - carried + pull), || {
+        computed_torque::acceleration(motion, gains)
+    });
     computed_torque::realise(input, &acceleration, gains, compensation, memory)
 }

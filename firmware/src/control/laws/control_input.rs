@@ -101,6 +101,24 @@ impl Task {
             actual,
         }
     }
+
+    /// Joint velocities for the task velocity `task`, or accelerations for an acceleration less J' qd: J^-1 `task`.
+    ///
+    /// Near the stretched arm the inverse is damped. There `joint`, the same aim in joint space, acts in the direction in
+    /// which the tool does not move and the damped inverse does nothing: the elbow is held there too.
+    pub fn joint_space(
+        &self,
+        task: &Vector4<f32>,
+        joint: impl FnOnce() -> Vector4<f32>,
+    ) -> Vector4<f32> {
+        let actual = &self.actual;
+        if actual.is_damped() {
+            let joint = joint();
+            joint + actual.joint_speed_damped(&(task - actual.task_velocity(&joint)))
+        } else {
+            actual.joint_speed_damped(task)
+        }
+    }
 }
 
 /// The terms of M(q) qdd + C qd + g + friction = tau in one sample: N m, N m, N, N m.

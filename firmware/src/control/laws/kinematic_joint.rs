@@ -4,11 +4,14 @@
 
 use nalgebra::Vector4;
 
-use super::{ControlInput, Gains, Memory, velocity_loop};
+use super::{ControlInput, Gains, Memory, Motion, velocity_loop};
 
 /// Joint torques of the velocity loop that follows the law's velocities.
 pub fn torque(input: &ControlInput<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
-    let motion = input.motion;
-    let command = motion.mean_qd + motion.position_error() * velocity_loop::outer_gain(gains);
-    velocity_loop::torque(&command, input, gains, memory)
+    velocity_loop::torque(&velocity(input.motion, gains), input, gains, memory)
+}
+
+/// Joint velocities that the law asks for.
+pub(super) fn velocity(motion: &Motion<'_>, gains: &Gains) -> Vector4<f32> {
+    motion.mean_qd + motion.position_error() * velocity_loop::outer_gain(gains)
 }
