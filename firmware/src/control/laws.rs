@@ -15,6 +15,7 @@
 pub mod computed_torque;
 pub mod computed_torque_task;
 mod control_input;
+mod gains;
 pub mod kinematic_joint;
 pub mod kinematic_task;
 pub mod observer;
@@ -23,70 +24,12 @@ pub mod pid;
 mod velocity_loop;
 
 use nalgebra::Vector4;
-use protocol::messages::{Compensation, Law, Refusal, RefusalReason};
-use protocol::parameters::ControllerParameter as Parameter;
+use protocol::messages::{Compensation, Law, Refusal};
 use serde::{Deserialize, Serialize};
 
 pub use control_input::{ControlInput, Model, Motion, Task};
+pub use gains::Gains;
 use observer::MomentumObserver;
-
-/// Closed-loop gains, the same three numbers for every law and every robot: they yield accelerations, and inertia turns
-/// those into torque.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Gains {
-    /// Natural frequency of the error dynamics, rad/s.
-    pub bandwidth: f32,
-    /// Damping ratio of the error dynamics.
-    pub damping: f32,
-    /// Corner frequency of the disturbance observer, or 1 / integral time, rad/s.
-    pub observer: f32,
-}
-
-impl Gains {
-    /// Defaults of the parameter table, for an arm as stiff as the model says, reduced where the delay of sampling
-    /// every `period` seconds requires it.
-    pub fn for_period(period: f32) -> Self {
-        Self {
-            bandwidth: Parameter::Bandwidth.initial(period),
-            damping: Parameter::Damping.initial(period),
-            observer: Parameter::Observer.initial(period),
-        }
-    }
-
-    /// Refuses gains that cannot be stable at this sampling period.
-    ///
-    /// # Errors
-    /// [`RefusalReason::OutOfRange`] with the gain and its bound: a bandwidth or observer corner
-    /// above a quarter radian per sample leaves no phase margin for the delays of sampling and bus.
-    pub fn check(&self, period: f32) -> Result<(), Refusal> {
-        for (value, parameter) in [
-            (self.bandwidth, Parameter::Bandwidth),
-            (self.damping, Parameter::Damping),
-            (self.observer, Parameter::Observer),
-        ] {
-            parameter
-                .rule()
-                .check(value, period)
-                .map_err(|limit| Refusal::value(RefusalReason::OutOfRange, value, limit))?;
-        }
-        Ok(())
-    }
-
-    /// Kp, 1/s².
-    pub fn proportional(&self) -> f32 {
-        self.bandwidth * self.bandwidth
-    }
-
-    /// Kd, 1/s.
-    pub fn derivative(&self) -> f32 {
-        2.0 * self.damping * self.bandwidth
-    }
-
-    /// Ki, 1/s³.
-    pub fn integral(&self) -> f32 {
-        self.proportional() * self.observer
-    }
-}
 
 /// What a law remembers between samples.
 #[derive(Clone, Copy, Debug)]
@@ -137,6 +80,15 @@ pub struct Selection {
 }
 
 impl Selection {
+    /// Refuses gains with which the sampled loop of this law would not be stable with a margin; see [`Gains::check`].
+    ///
+    /// # Errors
+    /// [`RefusalReason::OutOfRange`](protocol::messages::RefusalReason::OutOfRange) with the gain and its bound.
+    pub fn check(&self, period: f32, command_delay: f32) -> Result<(), Refusal> {
+        let integrates = self.law == Law::Pid || self.compensation == Compensation::Integral;
+        self.gains.check(period, command_delay, integrates)
+    }
+
     /// Joint torques for one sample.
     pub fn torque(&self, input: &ControlInput<'_>, memory: &mut Memory) -> Vector4<f32> {
         let gains = &self.gains;

@@ -10,6 +10,7 @@
 
 mod bench;
 mod faults;
+mod gains;
 mod parameters;
 mod reports;
 mod requests;

@@ -18,7 +18,7 @@ use protocol::time::Duration;
 use crate::bench::{Bench, PERIOD};
 
 /// A bench with a parameter client, and an arm that a test can push.
-struct Client {
+pub(crate) struct Client {
     bench: Bench,
     counters: [u8; 2],
     joints: Vector4<f32>,
@@ -49,7 +49,7 @@ impl Client {
     }
 
     /// A bench in Ready that has received the operator's Hello.
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let mut bench = Bench::new();
         bench.hello(protocol::table::HASH);
         bench.run(2);
@@ -88,7 +88,7 @@ impl Client {
         self.poll()
     }
 
-    fn reply(&mut self, request: ParameterRequest) -> ParameterReply {
+    pub(crate) fn reply(&mut self, request: ParameterRequest) -> ParameterReply {
         let sent = self.parameter(request);
         let reply = sent.iter().find_map(|message| match message {
             Message::ParameterReply(Server::Controller, reply) => Some(*reply),
@@ -97,7 +97,7 @@ impl Client {
         reply.unwrap_or_else(|| panic!("{request:?}: {sent:?}"))
     }
 
-    fn set(&mut self, parameter: ControllerParameter, value: f32) {
+    pub(crate) fn set(&mut self, parameter: ControllerParameter, value: f32) {
         let index = parameter.rule().number;
         let reply = self.reply(ParameterRequest::Set { index, value });
         let ParameterReply::Value { value: found, .. } = reply else {
@@ -106,7 +106,7 @@ impl Client {
         assert_eq!(found, value);
     }
 
-    fn get(&mut self, parameter: ControllerParameter) -> f32 {
+    pub(crate) fn get(&mut self, parameter: ControllerParameter) -> f32 {
         let index = parameter.rule().number;
         match self.reply(ParameterRequest::Get { index }) {
             ParameterReply::Value { value, .. } => value,
@@ -149,7 +149,7 @@ fn every_parameter_is_kept_by_itself() {
         let value = if rule.kind == Kind::Whole {
             rule.lower + 1.0
         } else {
-            0.75 * rule.lower + 0.25 * rule.upper_at(1e-3)
+            0.8 * rule.lower + 0.2 * rule.upper_at(1e-3)
         };
         bench.set(parameter, value);
         // A new sample does not bring the old value back.
@@ -331,7 +331,8 @@ fn the_drives_are_asked_through_the_controller() {
     let get = ParameterRequest::Get {
         index: DriveParameter::HoldSamples.rule().number,
     };
-    let list = ParameterRequest::List { from: 0x34 };
+    let last = ControllerParameter::ALL.last().unwrap().rule().number;
+    let list = ParameterRequest::List { from: last + 1 };
     for request in [get, list] {
         assert_eq!(
             bench.parameter(request),

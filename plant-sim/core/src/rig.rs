@@ -307,7 +307,7 @@ impl RigConfig {
 
 /// Time from a sample until its command acts: two frames and the computing time, on an
 /// otherwise idle bus with about half of the possible stuff bits.
-fn command_delay(timing: &BitTiming) -> Duration {
+pub(crate) fn command_delay(timing: &BitTiming) -> Duration {
     let frame = |info| timing.duration(FrameBits::exact(&specimen(info)));
     frame(&table::FEEDBACK) + COMPUTE + frame(&table::COMMAND)
 }

@@ -103,7 +103,7 @@ fn exactly<'de, D: Deserializer<'de>, const N: usize>(
     })
 }
 
-/// Gains of the closed loop, the same for every law. Those left out are the controller's own at this rate.
+/// Gains of the loop, for every law; those left out are the controller's own. The loop needs a margin for its delay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Gains")]

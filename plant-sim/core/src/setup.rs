@@ -98,7 +98,7 @@ impl RunConfig {
         let mut wrong = Vec::new();
         wrong.extend(
             scenario
-                .check_with(&self.nominal)
+                .check_with(&self.nominal, rig::command_delay(&timing))
                 .err()
                 .map(SetupError::from),
         );

@@ -45,6 +45,14 @@ pub trait Store {
     /// Where this parameter is stored.
     fn field(&mut self, parameter: Self::Parameter) -> Field<'_>;
 
+    /// Accepts a value within the range of this parameter, which the values of other parameters may narrow down.
+    ///
+    /// # Errors
+    /// The limit.
+    fn check(&self, _: Self::Parameter, _value: f32) -> Result<(), f32> {
+        Ok(())
+    }
+
     /// Called after this parameter has been written.
     fn changed(&mut self, parameter: Self::Parameter);
 }
@@ -97,6 +105,11 @@ pub fn serve<S: Store>(store: &mut S, request: &ParameterRequest) -> Option<Para
         && let Err((error, limit)) = rule.check_change(value, period, store.is_at_rest())
     {
         return refuse(error, limit);
+    }
+    if let Some(value) = new
+        && let Err(limit) = store.check(parameter, value)
+    {
+        return refuse(ParameterError::OutOfRange, limit);
     }
     let mut field = store.field(parameter);
     if let Some(value) = new {

@@ -3,6 +3,10 @@
 use protocol::parameters::{ControllerParameter as Parameter, Field, Store};
 
 use super::Controller;
+use crate::control::laws::{Gains, Selection};
+
+/// Bisections of the way from a value to one that is refused: a thousandth of it remains.
+const HALVINGS: u8 = 10;
 
 impl Store for Controller {
     type Parameter = Parameter;
@@ -44,6 +48,52 @@ impl Store for Controller {
             Parameter::FaultSamples => return Field::Whole(&mut monitor.samples),
             Parameter::BadFrames => return Field::Whole(&mut setup.bad_frames),
         })
+    }
+
+    /// Gains and command delay together have to leave the loop a margin. The limit is the value nearest to the one asked
+    /// for, to a thousandth of the way from the present one, with which they do.
+    #[inline(never)]
+    fn check(&self, parameter: Parameter, value: f32) -> Result<(), f32> {
+        let Selection { gains, .. } = self.setup.selection;
+        let mut numbers = [
+            gains.bandwidth,
+            gains.damping,
+            gains.observer,
+            self.setup.command_delay,
+        ];
+        let index = match parameter {
+            Parameter::Bandwidth => 0,
+            Parameter::Damping => 1,
+            Parameter::Observer => 2,
+            Parameter::CommandDelay => 3,
+            _ => return Ok(()),
+        };
+        let Some(&(mut good)) = numbers.get(index) else {
+            return Ok(());
+        };
+        let (mut bad, mut tried) = (value, value);
+        for halving in 0..=HALVINGS {
+            if let Some(number) = numbers.get_mut(index) {
+                *number = tried;
+            }
+            let [bandwidth, damping, observer, delay] = numbers;
+            let gains = Gains {
+                bandwidth,
+                damping,
+                observer,
+            };
+            let selection = Selection {
+                gains,
+                ..self.setup.selection
+            };
+            match selection.check(self.period(), delay) {
+                Ok(()) if halving == 0 => return Ok(()),
+                Ok(()) => good = tried,
+                Err(_) => bad = tried,
+            }
+            tried = 0.5 * (good + bad);
+        }
+        Err(good)
     }
 
     fn changed(&mut self, parameter: Parameter) {

@@ -4,7 +4,7 @@ use nalgebra::Vector4;
 use protocol::messages::{Compensation, MotionRequest, Refusal, RefusalReason};
 
 use super::Controller;
-use crate::control::laws::{Gains, Memory};
+use crate::control::laws::{Gains, Memory, Selection};
 use crate::control::states::{Event, State};
 use crate::mechanics::arm::{ModelError, Payload, Rule};
 use crate::mechanics::body::Body;
@@ -86,29 +86,33 @@ impl Controller {
             {
                 return Err(Refusal::because(RefusalReason::NoCompensation));
             }
-            MotionRequest::SelectLaw { law, compensation } => {
-                self.setup.selection.law = *law;
-                self.setup.selection.compensation = *compensation;
-                self.forget();
-                Answer::Now
-            }
+            MotionRequest::SelectLaw { law, compensation } => self.select(Selection {
+                law: *law,
+                compensation: *compensation,
+                ..self.setup.selection
+            })?,
             MotionRequest::SetGains {
                 bandwidth,
                 damping,
                 observer,
-            } => {
-                let gains = Gains {
+            } => self.select(Selection {
+                gains: Gains {
                     bandwidth: *bandwidth,
                     damping: *damping,
                     observer: *observer,
-                };
-                gains.check(self.config.period.seconds())?;
-                self.setup.selection.gains = gains;
-                self.forget();
-                Answer::Now
-            }
+                },
+                ..self.setup.selection
+            })?,
         };
         Ok(answer)
+    }
+
+    /// Uses this law with these gains from the next sample on.
+    fn select(&mut self, selection: Selection) -> Result<Answer, Refusal> {
+        selection.check(self.config.period.seconds(), self.setup.command_delay)?;
+        self.setup.selection = selection;
+        self.forget();
+        Ok(Answer::Now)
     }
 
     /// Resets the law's memory, which is valid only for the gains and the model it was gathered with.

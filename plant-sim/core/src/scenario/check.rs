@@ -2,11 +2,14 @@
 
 use std::f64::consts::TAU;
 
+use firmware::control::laws::{Gains, Selection};
 use protocol::messages::WristTurn;
+use protocol::time::Duration;
 use toml::de::{DeTable, DeValue};
 
 use super::{
-    Joints, Jump, Line, MAX_CYCLES, PayloadSpec, Place, Scenario, ScenarioError, Step, check_rate,
+    GainsSpec, Joints, Jump, Line, MAX_CYCLES, PayloadSpec, Place, Scenario, ScenarioError, Step,
+    check_rate,
 };
 use crate::allowed::schema::Each;
 use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
@@ -59,18 +62,14 @@ impl Scenario {
     ///
     /// # Errors
     /// See [`ScenarioError`].
-    pub fn check_with(&self, robot: &RobotModel) -> Result<(), ScenarioError> {
+    pub fn check_with(
+        &self,
+        robot: &RobotModel,
+        command_delay: Duration,
+    ) -> Result<(), ScenarioError> {
         let mut findings = Findings::of(self);
         if let Some(gains) = &self.gains {
-            let period = (1.0 / self.rate_hz) as f32;
-            for (key, parameter, value) in gains.each(period) {
-                let rule = parameter.rule();
-                if rule.check(value as f32, period).is_err() {
-                    let (lower, upper) = (rule.lower, rule.upper_at(period));
-                    let allowed = format!("{lower} to {upper} at {} Hz", self.rate_hz);
-                    findings.wrong(key, text::number(value), allowed);
-                }
-            }
+            findings.gains(gains, command_delay.seconds() as f32);
         }
         findings.gripper(Allowed::within(0.0, robot.payload_max, "kg"));
         findings.judge()
@@ -135,6 +134,50 @@ impl<'a> Findings<'a> {
                 // The next cycle would repeat it.
                 return;
             }
+        }
+    }
+
+    /// Checks each gain by itself, then all of them as the loop of the law.
+    fn gains(&mut self, gains: &GainsSpec, command_delay: f32) {
+        let (rate, law) = (self.scenario.rate_hz, self.scenario.law);
+        let period = (1.0 / rate) as f32;
+        let each = gains.each(period);
+        let known = self.wrong.len();
+        for (key, parameter, value) in each {
+            let rule = parameter.rule();
+            if rule.check(value as f32, period).is_err() {
+                let (lower, upper) = (rule.lower, rule.upper_at(period));
+                let allowed = format!("{lower} to {upper} at {rate} Hz");
+                self.wrong(key, text::number(value), allowed);
+            }
+        }
+        let [bandwidth, damping, observer] = each.map(|(_, _, value)| value as f32);
+        let selection = Selection {
+            law: law.law,
+            compensation: law.compensation,
+            gains: Gains {
+                bandwidth,
+                damping,
+                observer,
+            },
+        };
+        if self.wrong.len() > known {
+            return;
+        }
+        let Err(refusal) = selection.check(period, command_delay) else {
+            return;
+        };
+        let limit = refusal.limit;
+        if refusal.value == bandwidth {
+            let allowed = format!(
+                "at most {limit:.1} rad/s at {rate} Hz with damping {damping}: more leaves the loop too little margin for its delay"
+            );
+            self.wrong("gains.bandwidth", bandwidth, allowed);
+        } else {
+            let allowed = format!(
+                "at most {limit:.1} rad/s, bandwidth times damping, with a law that integrates"
+            );
+            self.wrong("gains.observer", observer, allowed);
         }
     }
 
