@@ -27,6 +27,7 @@ corrupted       3 frames     stop           brake          nothing        reset
 bad-value       3 frames     off            off            off            reset
 following-error each axis    stop           brake          off            reset
 over-speed      each axis    stop           brake          off            reset
+over-torque     200 ms       stop           brake          nothing        reset
 soft-limit      each axis    stop           nothing        nothing        reset
 estop           at once      emergency stop emergency stop emergency stop reset
 drive-fault     at once      brake          brake          nothing        reset
@@ -70,6 +71,7 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::BadValue => "value in the feedback; once in a torque of the law",
         Cause::FollowingError => "reference against encoder",
         Cause::OverSpeed => "speed of the encoder",
+        Cause::OverTorque => "torques cut to their limits: samples with less those without",
         Cause::SoftLimit => "position against range",
         Cause::EStop => "emergency stop on the bus",
         Cause::DriveFault => "status of the drives",

@@ -16,12 +16,11 @@ use std::path::Path;
 
 use protocol::messages::{Cause, ParameterError, RefusalReason};
 
-const CAUSES: [Cause; 7] = [
+const CAUSES: [Cause; 6] = [
     Cause::DuplicateNode,
     Cause::StuckSensor,
     Cause::Babbling,
     Cause::BusOff,
-    Cause::OverTorque,
     Cause::Overrun,
     Cause::SchemaMismatch,
 ];

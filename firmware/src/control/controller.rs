@@ -110,6 +110,8 @@ pub struct Controller {
     limits: LimitFlags,
     /// First fault since the last reset.
     fault: Fault,
+    /// Samples at a torque limit, less those below all of them.
+    saturated: u32,
     /// A fault not reported to the peers yet.
     alarm: Option<Fault>,
     /// What the last sample followed, as handed to the law.
@@ -146,6 +148,7 @@ impl Controller {
             limits: LimitFlags::EMPTY,
             fault: Fault::NONE,
             alarm: None,
+            saturated: 0,
             queue: MoveQueue::new(),
             setpoint: Setpoint::rest(Vector4::zeros()),
             memory: Memory::new(),
@@ -276,6 +279,7 @@ impl Controller {
             self.queue.clear(&q);
             self.error = Vector4::zeros();
             self.excess = Vector4::zeros();
+            self.saturated = 0;
             return self.torque_off();
         }
         let period = self.config.period.seconds();
@@ -324,10 +328,32 @@ impl Controller {
         let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
         self.excess = limited.excess;
         self.limits = self.limits | limited.flags;
+        if limited.flags != LimitFlags::EMPTY || self.saturated > 0 {
+            self.strain(limited.flags);
+        }
         probe.end(Phase::Limits);
         Actions {
             control: self.control_word(),
             torque: limited.motor_torque.into(),
+        }
+    }
+
+    /// Counts samples at a torque limit, less those below all of them. A planned move has a reserve: an axis that stays at its
+    /// limit meets something that the model does not have.
+    // Out of line: rare in a sample.
+    #[inline(never)]
+    fn strain(&mut self, flags: LimitFlags) {
+        if flags == LimitFlags::EMPTY {
+            self.saturated = self.saturated.saturating_sub(1);
+            return;
+        }
+        self.saturated += 1;
+        let time = self.saturated as f32 * self.config.period.seconds();
+        let limit = self.setup.saturation_time;
+        if time >= limit {
+            let fault = Fault::value(Cause::OverTorque, time * 1e3, limit * 1e3);
+            let axis = limits::first_axis(flags);
+            self.fail(Fault { axis, ..fault });
         }
     }
 

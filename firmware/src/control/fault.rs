@@ -23,6 +23,9 @@ pub const MAX_GAP_MS: u32 = milliseconds(Parameter::FeedbackGap);
 /// Age of the feedback at which the drives count as silent, ms: the watchdog time of moteus and the heartbeat of ODrive.
 /// The drives have switched off long before, after 5 samples without a command.
 pub const PEER_TIMEOUT_MS: u32 = milliseconds(Parameter::FeedbackTimeout);
+/// Time at a torque limit that stops the arm, ms: longer than one quick move, which a load heavier than announced may keep
+/// at the limit, and short beside the seconds in which a motor at its peak torque heats up.
+pub const SATURATION_MS: u32 = milliseconds(Parameter::SaturationTime);
 /// Consecutive rejected, stale or repeated feedback frames that stop the arm: two can be noise, and even at 500 Hz
 /// three last no longer than an allowed gap.
 pub const BAD_FRAMES: u8 = Parameter::BadFrames.initial(1.0) as u8;
@@ -103,7 +106,7 @@ const fn row(
 }
 
 /// Every cause that the controller raises.
-pub static REACTIONS: [Row; 12] = {
+pub static REACTIONS: [Row; 13] = {
     use Latch::{Reset, Restart};
     use Limit::{AtOnce, EachAxis, Frames, Milliseconds};
     use Reaction::{Brake, EmergencyStop, None, Off, Stop};
@@ -137,6 +140,12 @@ pub static REACTIONS: [Row; 12] = {
         row(Cause::BadValue, Frames(BAD_FRAMES), [Off, Off, Off], Reset),
         row(Cause::FollowingError, EachAxis, [Stop, Brake, Off], Reset),
         row(Cause::OverSpeed, EachAxis, [Stop, Brake, Off], Reset),
+        row(
+            Cause::OverTorque,
+            Milliseconds(SATURATION_MS),
+            [Stop, Brake, None],
+            Reset,
+        ),
         // An arm beyond its range stays there while it stops: no new information.
         row(Cause::SoftLimit, EachAxis, [Stop, None, None], Reset),
         row(

@@ -180,17 +180,25 @@ fn count(counter: &mut u32, violation: Option<Axis>, needed: u32) -> Option<Axis
     violation.filter(|_| *counter >= needed)
 }
 
+// Out of line: the faults of four limits, none of them in an ordinary sample.
+#[inline(never)]
 fn of_axis(cause: Cause, axis: Axis, value: &Vector4<f32>, limit: &Vector4<f32>) -> Fault {
     Fault {
         cause,
-        axis: match axis {
-            Axis::Shoulder => FaultAxis::Shoulder,
-            Axis::Elbow => FaultAxis::Elbow,
-            Axis::Lift => FaultAxis::Lift,
-            Axis::Wrist => FaultAxis::Wrist,
-        },
+        axis: axis.into(),
         value: finite(axis.of(value)),
         limit: axis.of(limit),
+    }
+}
+
+impl From<Axis> for FaultAxis {
+    fn from(axis: Axis) -> Self {
+        match axis {
+            Axis::Shoulder => Self::Shoulder,
+            Axis::Elbow => Self::Elbow,
+            Axis::Lift => Self::Lift,
+            Axis::Wrist => Self::Wrist,
+        }
     }
 }
 

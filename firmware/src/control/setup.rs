@@ -23,6 +23,8 @@ pub struct Setup {
     pub monitor: MonitorLimits,
     /// Age of the feedback at which the drives count as silent, s.
     pub feedback_timeout: f32,
+    /// Time at a torque limit that stops the arm, s.
+    pub saturation_time: f32,
     /// Rejected, stale or duplicate feedback frames in a row that stop the arm.
     pub bad_frames: u32,
 }
@@ -41,6 +43,7 @@ impl Setup {
             brake_delay: const { Parameter::BrakeDelay.initial(1.0) },
             monitor: MonitorLimits::DEFAULT,
             feedback_timeout: const { Parameter::FeedbackTimeout.initial(1.0) },
+            saturation_time: const { Parameter::SaturationTime.initial(1.0) },
             bad_frames: const { Parameter::BadFrames.initial(1.0) as u32 },
         }
     }

@@ -167,6 +167,11 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.velocity[2] = 610.0;
             bench.run(3)
         }
+        Cause::OverTorque => {
+            // 9 mm, below the limit of the following error and more than the motor can correct; 25 mm per turn.
+            bench.position[2] += (0.009 / 0.025 * 131_072.0) as i32;
+            bench.run(200)
+        }
         Cause::SoftLimit => {
             bench.request(MotionRequest::Disable);
             bench.put(&Vector4::new(0.2, 2.56, 0.15, 0.3));
@@ -192,7 +197,6 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
         | Cause::StuckSensor
         | Cause::Babbling
         | Cause::BusOff
-        | Cause::OverTorque
         | Cause::Overrun
         | Cause::SchemaMismatch => return None,
     };
@@ -225,6 +229,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::FollowingError => {
                 "following error, axis 2 (elbow): -0.100 rad, limit 0.050 rad".into()
             }
+            Cause::OverTorque => "over torque, axis 3 (lift): 200.0 ms, limit 200.0 ms".into(),
             Cause::OverSpeed => "over speed, axis 3 (lift): 2.43 m/s, limit 2.42 m/s".into(),
             Cause::SoftLimit => "soft limit, axis 2 (elbow): 2.560 rad, limit 2.551 rad".into(),
             Cause::EStop => "estop".to_owned(),

@@ -151,7 +151,7 @@ impl Fault {
         match (self.cause, self.axis) {
             (Cause::SelfTest, _) => Unit::KnownAnswer,
             (Cause::DriveFault, _) | (Cause::EncoderFault, None) => Unit::DriveStatus,
-            (Cause::FeedbackLost | Cause::PeerSilent, _) => Unit::Millisecond,
+            (Cause::FeedbackLost | Cause::PeerSilent | Cause::OverTorque, _) => Unit::Millisecond,
             (Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => Unit::Frame,
             (Cause::FollowingError | Cause::SoftLimit, None) => Unit::RadianOrMetre,
             (Cause::FollowingError | Cause::SoftLimit | Cause::EncoderFault, Lift) => Unit::Metre,
@@ -165,7 +165,6 @@ impl Fault {
                 | Cause::StuckSensor
                 | Cause::Babbling
                 | Cause::BusOff
-                | Cause::OverTorque
                 | Cause::Overrun
                 | Cause::EStop
                 | Cause::SchemaMismatch,
