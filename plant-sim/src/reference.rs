@@ -7,7 +7,7 @@ use schemars::transform::RecursiveTransform;
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value};
 
-/// What is said of a key that other programs have a use for.
+/// Description of a key that only other programs use.
 const UNUSED: &str = "Not used.";
 
 /// The schema of a file that is read.

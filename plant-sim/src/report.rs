@@ -54,7 +54,7 @@ struct About<'a> {
 pub fn page(results: &Results, drawing: &Drawing) -> String {
     let name = &results.summary.recipe.scenario;
     let mut results = serde_json::to_value(results).expect("numbers and texts are JSON");
-    // As long as the run, and drawn anyway.
+    // As long as the run itself, and the page draws it anyway.
     if let Some(members) = results.as_object_mut() {
         members.remove("each_cycle");
     }

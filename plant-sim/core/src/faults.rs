@@ -1,4 +1,4 @@
-//! Faults of a run, planned: what breaks, from when until when.
+//! Planned faults of a run: what breaks, and from when until when.
 //!
 //! A fault is one line of text, in a scenario as on the command line:
 //!
@@ -9,7 +9,7 @@
 //!
 //! Two parts of a run carry them out. A wrapper around each node ([`Faulty`]) changes the frames that the node sends; a
 //! peer without frames ([`Injector`]) breaks parts of the robot and repairs them. Both are seeded, so a run with faults
-//! repeats to the byte. The controller is not told.
+//! repeats to the byte. The controller is not informed.
 
 mod frames;
 mod injector;
@@ -75,15 +75,15 @@ pub enum What {
 pub enum FrameFault {
     /// It is lost, with this probability.
     Loss(f64),
-    /// It is late by this many seconds.
+    /// It is delayed by this many seconds.
     Delay(f64),
-    /// It is late by a random time, uniform from 0 to this many seconds.
+    /// It is delayed by a random time, uniform from 0 to this many seconds.
     Jitter(f64),
     /// It is sent twice.
     Duplicate,
     /// One bit of it is wrong, with this probability: a fault inside the node, which the CRC of the bus covers up.
     Corrupt(f64),
-    /// Its place is taken by the frame of this message that was sent this many frames before.
+    /// The frame of the same message that was sent this many frames earlier takes its place.
     Replay(usize),
 }
 

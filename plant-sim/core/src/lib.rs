@@ -16,6 +16,7 @@
 //! bus                    arbitration and exact frame times
 //! plant, model           the robot in f64, derived independently, and its data
 //! metrics                errors, settling, utilisation
+//! faults                 what breaks in a run, and when
 //! rehearsal              a scenario as the controller plans it, without a robot
 //! faults, campaign       what breaks in a run; many runs with faults, judged
 //! ```

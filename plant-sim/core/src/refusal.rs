@@ -55,7 +55,7 @@ fn asked(posture: Posture) -> String {
 fn parameter(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str> {
     use RefusalReason as Reason;
     Some(match (request, refusal.reason) {
-        // What else is out of range in a jump is refused before it is sent.
+        // Any other value of a jump that is out of range is refused before it is sent.
         (MotionRequest::Jump { .. }, Reason::OutOfRange) if refusal.limit == 0.0 => "top",
         (MotionRequest::Jump { .. }, Reason::JointLimit) if refusal.axis == 2 => "to or top",
         (_, Reason::OutOfRange) if request.is_move() => "speed",

@@ -1,6 +1,6 @@
 //! Fuzz targets: one function for each parser, which takes any bytes and panics where a promise is broken.
 //!
-//! A promise is more than that nothing panics: what is read is written and read again as the same, what is decoded encodes
+//! A promise is more than the absence of panics: what is read is written and read again as the same, what is decoded encodes
 //! to the same bytes, what is accepted runs. `tests/ci/23-fuzz.sh` has libFuzzer search for bytes that break one;
 //! `cargo test -p fuzz` runs what is in `corpus`, seeds and found crashes alike, where Rust is all there is.
 

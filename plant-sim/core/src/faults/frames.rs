@@ -1,4 +1,4 @@
-//! Faults of what a node sends.
+//! Faults in the frames that a node sends.
 
 use std::collections::VecDeque;
 
@@ -28,7 +28,7 @@ struct Suffered {
 }
 
 impl<P: Peer> Faulty<P> {
-    /// `peer` as `node`, with those of the faults that concern what it sends.
+    /// Wraps `peer`, which is `node`, in those faults that concern its frames.
     pub fn new(peer: P, node: Node, faults: &[Fault], seed: u64) -> Self {
         let concerned = faults.iter().filter(|fault| match fault.what {
             What::Frames(info, _) => info.sender.is_none_or(|sender| sender == node),
@@ -43,7 +43,7 @@ impl<P: Peer> Faulty<P> {
                     history: VecDeque::new(),
                 })
                 .collect(),
-            // Nodes draw from sequences of their own, so that what one sends does not change the luck of another.
+            // Each node draws from its own sequence, so that the frames of one do not change the faults of another.
             random: Rand64::new(u128::from(seed) << 8 | node as u128),
         }
     }

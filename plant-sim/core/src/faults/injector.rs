@@ -8,11 +8,11 @@ use crate::peer::{Outbox, Peer, PeerError};
 use crate::plant::Plant;
 use crate::world::World;
 
-/// Breaks parts of the robot when their time comes, and repairs them. It sits among the peers for the sake of time alone:
-/// no frame reaches it, and it sends none.
+/// Breaks parts of the robot when their time comes, and repairs them. It is a peer only to be called at the right times:
+/// it neither receives nor sends frames.
 #[derive(Debug)]
 pub struct Injector {
-    /// What is to be done, the latest first.
+    /// Pending changes, the latest first.
     todo: Vec<(Instant, What, Deed)>,
     seed: u64,
 }
@@ -24,7 +24,7 @@ enum Deed {
 }
 
 impl Injector {
-    /// For those of the faults that concern the robot; `seed` is that of the noise of encoders.
+    /// An injector of those faults that concern the robot; `seed` seeds the noise of encoders.
     pub fn new(faults: &[Fault], seed: u64) -> Self {
         let of_robot = faults
             .iter()
@@ -51,7 +51,7 @@ impl Injector {
             }
             What::Motor(axis, defect) => plant.break_motor(axis, is_broken.then_some(defect)),
             What::BrakeStuck => plant.break_brake(is_broken),
-            // What has fallen out does not come back.
+            // A payload that has fallen out does not come back.
             What::PayloadDropped if is_broken => plant.release(),
             What::PayloadDropped | What::Frames(..) | What::Silent(_) => {}
         }

@@ -9,7 +9,7 @@ use crate::model::AXES;
 use crate::plant::defect::{EncoderDefect, MotorDefect};
 use crate::text::nearest;
 
-/// Why a text is no fault: what is wrong and what is allowed.
+/// Why a text does not describe a fault: what is wrong and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct FaultError(String);

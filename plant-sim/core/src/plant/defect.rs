@@ -34,7 +34,7 @@ pub enum MotorDefect {
 pub(super) struct Defects {
     encoders: [Option<BrokenEncoder>; 4],
     motors: [Option<MotorDefect>; 4],
-    /// While the brake is stuck: what it was last told, closed or not.
+    /// While the brake is stuck: its last command, `true` to close.
     brake: Option<bool>,
 }
 
@@ -66,7 +66,7 @@ impl Plant {
         self.defects.motors[axis] = defect;
     }
 
-    /// Leaves the brake as it is, or lets it follow its last command again.
+    /// Blocks the brake in its present position, or lets it follow its last command again.
     pub fn break_brake(&mut self, is_stuck: bool) {
         if is_stuck {
             self.defects.brake = Some(self.brake.is_engaged());
