@@ -16,7 +16,7 @@
 //! bus                    arbitration and exact frame times
 //! plant, model           the robot in f64, derived independently, and its data
 //! metrics                errors, settling, utilisation
-//! faults                 what breaks in a run, and when
+//! requirements           what is required of a run, judged with its margin
 //! rehearsal              a scenario as the controller plans it, without a robot
 //! faults, campaign       what breaks in a run; many runs with faults, judged
 //! ```
@@ -57,6 +57,7 @@ pub mod plant;
 pub mod record;
 mod refusal;
 pub mod rehearsal;
+pub mod requirements;
 pub mod rig;
 pub mod run;
 pub mod scenario;

@@ -20,7 +20,7 @@ use serde::Serialize;
 
 use cycle::Cycle;
 pub use cycle::CycleResult;
-use offset::Offset;
+pub(crate) use offset::Offset;
 
 use crate::model::RobotModel;
 use crate::observer::Truth;
@@ -68,7 +68,8 @@ pub struct Metrics {
     peak_speed: [f64; 4],
     torque_squares: [f64; 4],
     samples: u64,
-    saturated_now: [u64; 4],
+    /// Samples for which each motor has been at its limit without a break.
+    pub(crate) saturated_now: [u64; 4],
     /// Longest run of samples with the motor at its limit, by axis.
     pub longest_saturation: [u64; 4],
 }
@@ -138,13 +139,20 @@ impl Metrics {
 
     /// One sample.
     pub fn sample(&mut self, truth: &Truth) {
-        let Some(cycle) = &mut self.cycle else { return };
+        let _ = self.tracked(truth);
+    }
+
+    /// One sample; returns the offset of the tool from its reference, while that moves.
+    pub(crate) fn tracked(&mut self, truth: &Truth) -> Option<Offset> {
+        let cycle = self.cycle.as_mut()?;
+        let mut tracking = None;
         if cycle.sample(truth) {
             let commanded = self.arm.pose(&self.arm.at(&truth.mind.q.into()));
             let commanded = [commanded.x, commanded.y, commanded.z, commanded.yaw];
             let error = Offset::between(&truth.plant.tool, &commanded);
             self.tracking_mm.add(error.position * 1e3);
             self.tracking_mrad.add(error.yaw * 1e3);
+            tracking = Some(error);
         }
         self.samples += 1;
         for axis in 0..4 {
@@ -160,6 +168,7 @@ impl Metrics {
             };
             self.longest_saturation[axis] = self.longest_saturation[axis].max(*saturated);
         }
+        tracking
     }
 
     /// Distance of true and commanded tool while moving, mm.

@@ -7,8 +7,8 @@ pub(crate) mod program;
 use protocol::codec::{self, Encoder};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, Hello, Message, Mode, Motion, MotionRequest, Node, Outcome, ParameterReply,
-    ParameterRequest, Server, State,
+    Cause, EStop, EStopReason, Hello, Message, Mode, Motion, MotionRequest, Node, Outcome,
+    ParameterReply, ParameterRequest, Server, State,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
@@ -211,6 +211,10 @@ impl Operator {
                     request: *request,
                 })
             }
+            Action::EmergencyStop => Message::EStop(EStop {
+                reason: EStopReason::BUTTON,
+                counter: 0,
+            }),
             _ => return None,
         };
         // A value that no frame can carry is not sent; the error of the missing reply then names the request.
@@ -285,7 +289,7 @@ impl Operator {
                 (arrived, limit)
             }
             Action::Dwell(time) => (waited >= *time, Duration::MAX),
-            Action::Cell(_) => (true, Duration::MAX),
+            Action::EmergencyStop | Action::Cell(_) => (true, Duration::MAX),
         };
         if complete || waited <= limit {
             return Ok(complete);
@@ -316,7 +320,7 @@ impl Operator {
             }
             Action::WaitMode(mode) => format!("state {mode}"),
             Action::WaitArrived => "end of the move".into(),
-            Action::Dwell(_) | Action::Cell(_) => "end of a dwell".into(),
+            Action::EmergencyStop | Action::Dwell(_) | Action::Cell(_) => "end of a dwell".into(),
         }
     }
 }

@@ -97,6 +97,8 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, RehearsalError> {
                     break;
                 }
             }
+            // The end of the run.
+            Action::EmergencyStop => break,
             _ => match stage.act(&action, spot) {
                 Ok(()) => {}
                 Err(refusal @ OperatorError::Refused { .. }) => refused.push(refusal),
@@ -193,7 +195,7 @@ impl Stage {
                 let samples = (time.seconds() / f64::from(self.period)).ceil() as u64;
                 (0..samples).try_for_each(|_| self.sample())
             }
-            Action::Hello | Action::Cell(_) => Ok(()),
+            Action::Hello | Action::EmergencyStop | Action::Cell(_) => Ok(()),
         }
     }
 

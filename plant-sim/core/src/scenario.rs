@@ -3,6 +3,8 @@
 mod change;
 mod check;
 mod error;
+mod library;
+mod requirement;
 mod step;
 
 use protocol::messages::WristTurn;
@@ -19,24 +21,12 @@ use crate::selection::LawChoice;
 pub use change::Change;
 use error::for_people;
 pub use error::{Place, ScenarioError};
+pub use library::{built_in, names};
+pub(crate) use requirement::Measured;
+pub use requirement::{Axis, Ending, Quantity, Requirement, StateName};
 
 pub use crate::text::Source;
 pub use step::{Elbow, Joints, Jump, Line, Step};
-
-macro_rules! built_in {
-    ($($name:literal),+) => {
-        [$(($name, include_str!(concat!("../../scenarios/", $name, ".toml")))),+]
-    };
-}
-
-/// Scenarios that come with the program: name and text.
-const BUILT_IN: [(&str, &str); 5] = built_in![
-    "gate",
-    "gate-mismatch",
-    "gate-vertical",
-    "square",
-    "pick-place"
-];
 
 /// What to run. Lengths in m in frame 0, angles in rad. An unknown key is refused.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -44,6 +34,9 @@ const BUILT_IN: [(&str, &str); 5] = built_in![
 pub struct Scenario {
     /// Name, for the summary.
     pub name: String,
+    /// What it is for, in a sentence.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub about: Option<String>,
     /// Number of cycles.
     #[schemars(range(min = 1, max = MAX_CYCLES))]
     pub cycles: u32,
@@ -79,9 +72,15 @@ pub struct Scenario {
     /// Seed of whatever is random in the faults.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub seed: u64,
+    /// How the run is to end: one that ends otherwise has failed.
+    #[serde(default, skip_serializing_if = "Ending::is_usual")]
+    pub ends: Ending,
     /// Steps of one cycle.
     #[schemars(length(min = 1))]
     pub cycle: Vec<Step>,
+    /// What is required of the run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub requirements: Vec<Requirement>,
     /// The text that this was read from, for places in messages.
     #[serde(skip)]
     pub source: Source,
@@ -219,17 +218,6 @@ fn is_zero(seed: &u64) -> bool {
     *seed == 0
 }
 
-/// The text of the scenario of this name that comes with the program.
-pub fn built_in(name: &str) -> Option<&'static str> {
-    let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
-    Some(text)
-}
-
-/// Names of the scenarios that come with the program.
-pub fn names() -> String {
-    BUILT_IN.map(|(name, _)| name).join(", ")
-}
-
 impl Scenario {
     /// The scenario of this name that comes with the program.
     pub fn built_in(name: &str) -> Option<Self> {
@@ -314,23 +302,5 @@ pub fn check_rate(rate_hz: f64) -> Result<(), &'static str> {
         Ok(())
     } else {
         Err("100 to 10000 Hz")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn built_in_scenarios_are_valid_and_named_as_listed() {
-        for (name, text) in BUILT_IN {
-            let scenario = Scenario::parse(text, name).unwrap();
-            assert_eq!(scenario.name, name);
-        }
-    }
-
-    #[test]
-    fn there_is_no_scenario_of_another_name() {
-        assert!(Scenario::built_in("nowhere").is_none());
     }
 }

@@ -140,7 +140,7 @@ impl RunConfig {
                     let pose = arm.pose(&arm.at(&joints.to.into()));
                     target = Some([pose.x, pose.y, pose.z, pose.yaw]);
                 }
-                Step::Stop(_) => target = None,
+                Step::Stop(_) | Step::Estop(_) => target = None,
                 Step::Dwell(_) | Step::Pick(_) | Step::Place {} => {}
             }
         }

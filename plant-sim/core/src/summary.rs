@@ -10,6 +10,7 @@ use protocol::messages::{Cause, FaultAxis, Message, Node, State};
 use protocol::schema::Content;
 use protocol::table;
 use protocol::time::Instant;
+use protocol::wire::{BitTiming, FrameBits};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -17,9 +18,11 @@ pub use recipe::{GainsInForce, Model, Models, Recipe};
 
 use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
 use crate::observer::{Observer, Truth};
+use crate::requirements::{Judge, Seen, Verdict};
 use crate::rig::{Rig, RunError};
+use crate::scenario::Ending;
 use crate::setup::RunConfig;
-use crate::world::CellEvent;
+use crate::world::{CellEvent, OperatorError};
 
 /// Summary of a run, as `summary.json` holds it. Times in s, lengths in mm, shares of 1.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -37,6 +40,12 @@ pub struct Summary {
     pub completed: bool,
     /// Why it did not.
     pub error: Option<String>,
+    /// Whether the controller stopped the arm, for a fault or an emergency stop.
+    pub stopped: bool,
+    /// Whether it ended as the scenario says, and met every requirement.
+    pub passed: bool,
+    /// What is required of the run, and what became of it.
+    pub requirements: Vec<Verdict>,
     /// Final state of the controller, as reported; `null` if never.
     pub state: Option<&'static str>,
     /// Fault latched at the end.
@@ -124,12 +133,14 @@ impl Fault {
 /// The observer that makes a [`Summary`].
 pub struct Collector {
     metrics: Metrics,
+    judge: Judge,
     faults: Vec<Fault>,
     /// The last state.
     state: Option<State>,
     /// Whether an emergency has arrived and no state since.
     awaits_state: bool,
     target: Option<[f64; 4]>,
+    timing: BitTiming,
     /// Whether a command has arrived since the last sample; `None` before the very first.
     answered: Option<bool>,
     overruns: u64,
@@ -140,10 +151,12 @@ impl Collector {
     pub fn new(config: &RunConfig) -> Self {
         Self {
             metrics: Metrics::new(&config.actual),
+            judge: Judge::new(config),
             faults: Vec::new(),
             state: None,
             awaits_state: false,
             target: config.cycle_target(),
+            timing: BitTiming::default(),
             answered: None,
             overruns: 0,
         }
@@ -158,6 +171,7 @@ impl Collector {
     ) -> Summary {
         let Self {
             metrics,
+            judge,
             faults,
             state,
             overruns,
@@ -166,6 +180,16 @@ impl Collector {
         let scenario = &config.scenario;
         let bus = rig.bus();
         let sim = rig.now();
+        let frames_lost = rig.dropped() + 2 * bus.collisions;
+        let requirements = judge.finish(frames_lost, sim.seconds());
+        let stopped = matches!(
+            result,
+            Err(RunError::Operator(OperatorError::Stopped { .. }))
+        );
+        let ended_well = match scenario.ends {
+            Ending::Completed => result.is_ok(),
+            Ending::Stopped => stopped,
+        };
         Summary {
             recipe: Recipe::new(config),
             cycles: metrics.cycles.len() as u32,
@@ -173,6 +197,9 @@ impl Collector {
             cycles_still: metrics.still() as u32,
             completed: result.is_ok(),
             error: result.as_ref().err().map(ToString::to_string),
+            stopped,
+            passed: ended_well && requirements.iter().all(|verdict| verdict.met),
+            requirements,
             state: state.map(|state| state.mode.name()),
             fault: state
                 .map(|state| state.fault())
@@ -198,7 +225,7 @@ impl Collector {
             bus_load: bus.total.load(sim.since(Instant::ORIGIN)),
             frames: bus.total.frames,
             overruns,
-            frames_lost: rig.dropped() + 2 * bus.collisions,
+            frames_lost,
             faults,
             sim_time_s: sim.seconds(),
             each_cycle: metrics.cycles,
@@ -208,6 +235,9 @@ impl Collector {
 
 impl Observer for Collector {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        let timing = &self.timing;
+        self.judge
+            .frame(time, || timing.duration(FrameBits::exact(frame)));
         match table::of_frame(frame).map(|info| info.content) {
             Some(Content::Emergency(Node::Controller)) => {}
             Some(Content::Command) => {
@@ -240,6 +270,7 @@ impl Observer for Collector {
                     text: String::new(),
                 };
                 fault.describe(&emergency.fault());
+                self.judge.fault(time);
                 self.faults.push(fault);
                 self.awaits_state = true;
             }
@@ -260,19 +291,32 @@ impl Observer for Collector {
     }
 
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
-        self.metrics.sample(truth);
-        if let Some(answered) = &mut self.answered
-            && !std::mem::take(answered)
-        {
-            self.overruns += 1;
-        }
+        let tracking = self.metrics.tracked(truth);
+        let late = self
+            .answered
+            .as_mut()
+            .is_some_and(|answered| !std::mem::take(answered));
+        self.overruns += u64::from(late);
+        let seen = Seen {
+            tracking,
+            saturated: self.metrics.saturated_now,
+            late,
+        };
+        self.judge.sample(truth, &seen);
         Ok(())
     }
 
     fn cell_event(&mut self, event: &CellEvent) {
         match event {
-            CellEvent::BeginCycle => self.metrics.begin_cycle(self.target),
-            CellEvent::EndCycle => self.metrics.end_cycle(),
+            CellEvent::BeginCycle => {
+                self.metrics.begin_cycle(self.target);
+                self.judge.begin_cycle();
+            }
+            CellEvent::EndCycle => {
+                let before = self.metrics.cycles.len();
+                self.metrics.end_cycle();
+                self.judge.end_cycle(self.metrics.cycles.get(before));
+            }
             CellEvent::Attach(_) | CellEvent::Release => {}
         }
     }

@@ -9,6 +9,7 @@ use sim::operator::Operator;
 use sim::rig::Rig;
 use sim::scenario::Scenario;
 use sim::setup::RunConfig;
+use sim::summary::Collector;
 
 use crate::Bytes;
 
@@ -34,18 +35,29 @@ fn begin(config: &RunConfig) -> bool {
     rig.attach(drives);
     rig.attach(Operator::new(&config.scenario));
     rig.attach(controller);
+    let mut collector = Collector::new(config);
     for _ in 0..SAMPLES {
-        if rig.step(&mut (), &mut ()).is_err() {
+        if rig.step(&mut (), &mut collector).is_err() {
             break;
         }
         assert!(rig.plant().q().iter().all(|q| q.is_finite()));
     }
+    let summary = collector.finish(config, &rig, &Ok(()));
+    assert_eq!(
+        summary.requirements.len(),
+        config.scenario.requirements.len()
+    );
     true
 }
 
 fn scenario_runs(text: &str) -> bool {
     match Scenario::parse(text, "a.toml") {
-        Ok(scenario) => begin(&RunConfig::new(scenario)),
+        Ok(scenario) => {
+            let written = scenario.to_toml();
+            let again = Scenario::parse(&written, "again").expect("what is written is read");
+            assert_eq!(again.to_toml(), written);
+            begin(&RunConfig::new(scenario))
+        }
         Err(error) => {
             assert!(error.to_string().contains("a.toml"));
             false
@@ -122,6 +134,9 @@ mod tests {
     fn seeds_are_run() {
         assert!(scenario_runs(include_str!(
             "../corpus/scenario/values.toml"
+        )));
+        assert!(scenario_runs(include_str!(
+            "../corpus/scenario/requirements.toml"
         )));
         assert!(gains_run(include_bytes!("../corpus/gains/usual")));
         let payload = include_str!("../corpus/payload/two-kg.json");

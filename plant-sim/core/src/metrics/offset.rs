@@ -6,27 +6,27 @@ use crate::maths::{remainder, square};
 
 /// Offset of a tool from its target; neither part is negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Offset {
+pub(crate) struct Offset {
     /// m.
-    pub(super) position: f64,
+    pub(crate) position: f64,
     /// rad, the shorter way round.
-    pub(super) yaw: f64,
+    pub(crate) yaw: f64,
 }
 
 impl Offset {
-    pub(super) const fn new(position: f64, yaw: f64) -> Self {
+    pub(crate) const fn new(position: f64, yaw: f64) -> Self {
         Self { position, yaw }
     }
 
     /// Between two poses x, y, z (m), yaw (rad).
-    pub(super) fn between([x, y, z, yaw]: &[f64; 4], to: &[f64; 4]) -> Self {
+    pub(crate) fn between([x, y, z, yaw]: &[f64; 4], to: &[f64; 4]) -> Self {
         Self {
             position: (square(x - to[0]) + square(y - to[1]) + square(z - to[2])).sqrt(),
             yaw: remainder(yaw - to[3], TAU).abs(),
         }
     }
 
-    pub(super) fn is_within(self, radius: Self) -> bool {
+    pub(crate) fn is_within(self, radius: Self) -> bool {
         self.position <= radius.position && self.yaw <= radius.yaw
     }
 }

@@ -17,6 +17,7 @@ const SETTLING: Duration = Duration::from_millis(100);
 pub(crate) enum Action {
     Hello,
     Request(MotionRequest),
+    EmergencyStop,
     WaitMode(Mode),
     WaitArrived,
     Dwell(Duration),
@@ -135,6 +136,11 @@ impl Program {
             Step::Stop(seconds) => vec![
                 Action::Dwell(Duration::from_seconds(*seconds)),
                 Action::Request(MotionRequest::Stop),
+            ],
+            Step::Estop(seconds) => vec![
+                Action::Dwell(Duration::from_seconds(*seconds)),
+                Action::EmergencyStop,
+                Action::WaitMode(Mode::EStop),
             ],
             Step::Pick(payload) => {
                 vec![Action::WaitArrived, self.attach(payload), announce(payload)]

@@ -1,5 +1,7 @@
 //! Checks of a scenario before anything runs: ranges, and that the gripper can do what it has to.
 
+mod requirements;
+
 use std::f64::consts::TAU;
 
 use firmware::control::laws::{Gains, Selection};
@@ -29,6 +31,10 @@ pub(super) const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
 /// At a ten-thousandth a move takes hours; slower ones are meant otherwise.
 pub(super) const SPEED: Allowed = Allowed::within(1e-4, 1.0, "of full speed");
 pub(super) const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
+/// A limit of a requirement, in whatever unit.
+pub(super) const AMOUNT: Allowed = Allowed::within(0.0, 1e9, "");
+/// A moment of a run.
+pub(super) const MOMENT: Allowed = Allowed::within(0.0, 1e9, "s");
 pub(super) const FACTOR: Allowed = Allowed::within(0.0, 10.0, "");
 
 impl Scenario {
@@ -54,6 +60,7 @@ impl Scenario {
         for (index, step) in self.cycle.iter().enumerate() {
             findings.step(&format!("cycle[{index}]"), step);
         }
+        findings.requirements();
         findings.judge()
     }
 
@@ -213,6 +220,7 @@ impl<'a> Findings<'a> {
             }
             Step::Dwell(seconds) => self.number(&format!("{key}.dwell"), *seconds, SECONDS),
             Step::Stop(seconds) => self.number(&format!("{key}.stop"), *seconds, SECONDS),
+            Step::Estop(seconds) => self.number(&format!("{key}.estop"), *seconds, SECONDS),
             Step::Pick(payload) => {
                 let key = format!("{key}.pick");
                 if payload.mass == 0.0 {

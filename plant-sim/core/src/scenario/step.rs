@@ -23,6 +23,8 @@ pub enum Step {
     Dwell(#[schemars(transform = by(check::SECONDS))] f64),
     /// This many seconds after the last move was accepted, stop on the path.
     Stop(#[schemars(transform = by(check::SECONDS))] f64),
+    /// This many seconds after the last move was accepted, press the emergency stop.
+    Estop(#[schemars(transform = by(check::SECONDS))] f64),
     /// Take a payload and announce it.
     Pick(PayloadSpec),
     /// Release the payload and announce it.
@@ -38,6 +40,7 @@ impl Step {
             Self::Joints(_) => "joints",
             Self::Dwell(_) => "dwell",
             Self::Stop(_) => "stop",
+            Self::Estop(_) => "estop",
             Self::Pick(_) => "pick",
             Self::Place {} => "place",
         }

@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use trace::LogHash;
 
 use crate::model::RobotModel;
-use crate::scenario::{Mismatch, PayloadSpec, Scenario};
+use crate::scenario::{Ending, Mismatch, PayloadSpec, Scenario};
 use crate::setup::RunConfig;
 
 /// What was run. With the same version of the program, `scenario_text` and the two models give the same trace and the
@@ -17,6 +17,8 @@ pub struct Recipe {
     pub scenario: String,
     /// The scenario as it was run, including changes from the command line, as the text of a scenario file.
     pub scenario_text: String,
+    /// How the run was to end.
+    pub ends: Ending,
     /// Law and compensation.
     pub law: String,
     /// Control rate, Hz.
@@ -73,6 +75,7 @@ impl Recipe {
         Self {
             scenario: scenario.name.clone(),
             scenario_text: scenario.to_toml(),
+            ends: scenario.ends,
             law: scenario.law.to_string(),
             rate_hz: scenario.rate_hz,
             gains: gains(scenario),
