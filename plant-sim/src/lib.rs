@@ -11,6 +11,7 @@
 //! check, replay, plot    a trace judged, repeated and drawn
 //! play, record, monitor  a trace sent to a bus, a bus recorded, and a bus watched
 //! report                 the pages about runs (sources in pages)
+//! verdicts               what became of requirements: in words, JUnit XML, needs.json and Markdown
 //! chart                  the SVG of plot and of external's histogram
 //! eval, input            models evaluated over the rows of a table; scenarios and robots from files
 //! reference              schemas of files and JSON output, and tables of them for the documents
@@ -57,6 +58,7 @@ pub mod replay;
 pub mod report;
 pub mod run;
 pub mod twin;
+pub mod verdicts;
 pub mod viewers;
 
 pub use terminal::say;

@@ -190,10 +190,18 @@ fn taken(path: &Path, there: FileType, hint: &'static str) -> OutputError {
 /// # Errors
 /// See [`OutputError`].
 pub fn write(path: &Path, text: &str) -> Result<(), OutputError> {
-    let mut file = File::create(path)?;
-    file.write_all(text.as_bytes())
-        .map_err(OutputError::at(path))?;
-    file.persist()
+    finish(File::create(path)?, text)
+}
+
+/// Writes a whole text to a file that was created for it.
+///
+/// # Errors
+/// See [`OutputError`].
+pub fn finish(mut file: File, text: &str) -> Result<(), OutputError> {
+    match file.write_all(text.as_bytes()) {
+        Ok(()) => file.persist(),
+        Err(source) => Err(OutputError::at(&file.path)(source)),
+    }
 }
 
 /// What files under construction of a run are called; only a run that was killed leaves one.

@@ -83,6 +83,11 @@ impl Page<'_> {
         if let Some(element) = schema.get("items") {
             let kind = self.kind(element);
             let _ = writeln!(self.text, "An array; its elements are {kind}.");
+        } else if let Some(names) = documented(schema) {
+            self.text += "One of these names:\n\n| name | meaning |\n|---|---|\n";
+            for (name, about) in names {
+                let _ = writeln!(self.text, "| `{name}` | {} |", about.replace('\n', " "));
+            }
         } else if let Some(variants) = schema["oneOf"].as_array() {
             self.text += "One of these keys, with its value:\n\n";
             self.table(variants.iter().filter_map(|variant| {
@@ -214,6 +219,14 @@ impl Page<'_> {
 /// The name of the definition that a schema refers to.
 fn definition(schema: &Value) -> Option<&str> {
     schema["$ref"].as_str()?.strip_prefix("#/$defs/")
+}
+
+/// Names of an enumeration, each with its description.
+fn documented(schema: &Value) -> Option<Vec<(&str, &str)>> {
+    let variants = schema["oneOf"].as_array()?.iter();
+    variants
+        .map(|variant| Some((variant["const"].as_str()?, variant["description"].as_str()?)))
+        .collect()
 }
 
 fn properties(schema: &Value) -> Option<&Map<String, Value>> {

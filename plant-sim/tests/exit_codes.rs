@@ -57,6 +57,22 @@ fn done_is_0() {
             "irb930-12-0.85",
             "--json",
         ],
+        &[
+            "run",
+            "--scenario",
+            "estop-descent",
+            "--junit",
+            "verdicts.xml",
+        ],
+        &[
+            "run",
+            "--cycles",
+            "1",
+            "--law",
+            "pid",
+            "--set",
+            "requirements=[]",
+        ],
         &["check"],
         &["check", "gate", "--set", "gains.bandwidth=80", "--json"],
         &["model", "irb930-12-0.85"],
@@ -81,6 +97,17 @@ fn a_run_or_check_that_failed_is_1() {
     ];
     for failed in [
         &[&["run", "--cycles", "1"][..], &faulty].concat()[..],
+        // The gate requires more than this law can do.
+        &["run", "--cycles", "1", "--law", "pid"],
+        // Stopped, where the scenario says completed, and the other way round.
+        &[
+            "run",
+            "--scenario",
+            "estop-descent",
+            "--set",
+            "ends=completed",
+        ],
+        &["run", "--cycles", "1", "--set", "ends=stopped"],
         &["check", "--set", "cycle[0].jump.top=-0.29"],
         &["run", "--set", "cycle[0].jump.top=-0.29"],
         &["trace", "check", "bad.log"],
@@ -123,6 +150,7 @@ fn wrong_usage_or_input_is_2() {
         &["run", "--channel", "uart"],
         &["run", "--out", "empty.log"],
         &["run", "--out", "/dev/null"],
+        &["run", "--junit", "."],
         &["check", "nowhere.toml"],
         &["trace", "check", "nowhere.log"],
         &["trace", "decode", "bad.log", "--out", "bad.log"],

@@ -6,14 +6,13 @@ use clap::Args;
 use sim::rehearsal::{Plan, RehearsalError, rehearse};
 use sim::world::OperatorError;
 
-use super::run::ConfigArgs;
+use super::run::{ConfigArgs, what};
 use super::{Failure, show};
 
 /// Arguments of `check`.
 #[derive(Args)]
 pub(super) struct CheckArgs {
-    /// What to check: gate, gate-mismatch, square, pick-place, or a scenario file.
-    #[arg(value_name = "SCENARIO", default_value = "gate")]
+    #[arg(value_name = "SCENARIO", default_value = "gate", help = what("check"))]
     scenario: String,
     #[command(flatten)]
     config: ConfigArgs,

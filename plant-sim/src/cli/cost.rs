@@ -16,14 +16,14 @@ use sim::run::with_controller;
 use sim::selection::LawChoice;
 use sim::setup::RunConfig;
 
+use super::run::what;
 use super::values::image;
 use super::{Failure, show};
 
 /// Arguments of `cost`.
 #[derive(Args)]
 pub(super) struct CostArgs {
-    /// What to run: gate, gate-mismatch, gate-vertical, square, pick-place, or a scenario file.
-    #[arg(long, value_name = "NAME|FILE", default_value = "gate")]
+    #[arg(long, value_name = "NAME|FILE", default_value = "gate", help = what("run"))]
     scenario: String,
     /// Control law, as for run; the default is the most expensive one.
     #[arg(

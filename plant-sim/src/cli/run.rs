@@ -3,6 +3,7 @@
 mod config;
 mod place;
 mod text;
+mod verdicts;
 
 use std::path::PathBuf;
 
@@ -14,6 +15,7 @@ use plant_sim::qemu::{self, Qemu};
 use plant_sim::report;
 use plant_sim::run::{self, Recording, Results};
 use plant_sim::say;
+use plant_sim::verdicts::failure;
 use plant_sim::viewers::Viewers;
 use protocol::time::Period;
 use sim::controller::InProcess;
@@ -21,14 +23,14 @@ use sim::curves::Curves;
 use sim::setup::RunConfig;
 
 use super::{Failure, show};
-pub(super) use config::{ConfigArgs, load};
+pub(super) use config::{ConfigArgs, load, what};
 use place::{Place, PlaceArgs};
+use verdicts::VerdictArgs;
 
 /// Arguments of `run`.
 #[derive(Args, Clone)]
 pub(super) struct RunArgs {
-    /// What to run: gate, gate-mismatch, gate-vertical, square, pick-place, or a scenario file.
-    #[arg(long, value_name = "NAME|FILE", default_value = "gate")]
+    #[arg(long, value_name = "NAME|FILE", default_value = "gate", help = config::what("run"))]
     scenario: String,
     #[command(flatten)]
     config: ConfigArgs,
@@ -50,6 +52,8 @@ pub(super) struct RunArgs {
     /// Print summary.json instead of the text.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    verdicts: VerdictArgs,
 }
 
 /// Runs the scenario, writes the results and shows the summary.
@@ -58,6 +62,7 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     let config = args.config.config(&args.scenario)?;
     // Everything that can be refused is, before the folder is touched.
     config.rig().map_err(Failure::usage)?;
+    let verdicts = args.verdicts.create()?;
     let folder = run::folder(&args.out)?;
     let recording = Recording {
         folder: &folder,
@@ -135,12 +140,8 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     } else if !args.quiet {
         show(&text::report(&results, &config, &args.out))?;
     }
-    match &results.summary.error {
-        None => Ok(()),
-        Some(error) => Err(Failure::failed(format!(
-            "the run was not completed: {error}"
-        ))),
-    }
+    verdicts.write(&results)?;
+    failure(&results.summary).map_or(Ok(()), |why| Err(Failure::failed(why)))
 }
 
 /// Writes the page about the run.

@@ -5,12 +5,20 @@ use plant_sim::input;
 use plant_sim::say;
 use sim::faults::Fault;
 use sim::model::RobotModel;
-use sim::scenario::Change;
+use sim::scenario::{self, Change};
 use sim::selection::LawChoice;
 use sim::setup::RunConfig;
 
 use crate::cli::Failure;
 use crate::cli::values::{number, whole};
+
+/// Help for the name of a scenario that a command is to `act` on.
+pub(crate) fn what(act: &str) -> String {
+    format!(
+        "What to {act}: a scenario file, or one that comes with the program: {}",
+        scenario::names()
+    )
+}
 
 /// Options that change a scenario and choose robots.
 #[derive(Args, Clone)]

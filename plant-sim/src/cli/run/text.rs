@@ -5,7 +5,9 @@ use std::path::Path;
 
 use plant_sim::report::FILE;
 use plant_sim::run::Results;
+use plant_sim::verdicts::{ending, finding, limit};
 use sim::model::AXES;
+use sim::scenario::Ending;
 use sim::setup::RunConfig;
 use sim::summary::Summary;
 
@@ -193,6 +195,7 @@ fn end(summary: &Summary, text: &mut String) {
             fault.description
         );
     }
+    requirements(summary, text);
     if !summary.completed {
         let rest = if summary.at_rest {
             "at rest, brake closed"
@@ -200,5 +203,25 @@ fn end(summary: &Summary, text: &mut String) {
             "not at rest"
         };
         line!(text, "  arm in the end    {rest}");
+    }
+}
+
+/// What is required, and what became of it.
+fn requirements(summary: &Summary, text: &mut String) {
+    for (index, verdict) in summary.requirements.iter().enumerate() {
+        let requirement = &verdict.requirement;
+        line!(
+            text,
+            "  {:<18}{} {}: {}; {}",
+            if index == 0 { "requirements" } else { "" },
+            if verdict.met { "met   " } else { "MISSED" },
+            requirement.id,
+            limit(requirement),
+            finding(verdict)
+        );
+    }
+    if summary.recipe.ends == Ending::Stopped {
+        let (Ok(end) | Err(end)) = ending(summary);
+        line!(text, "  end               {end}");
     }
 }
