@@ -21,7 +21,7 @@ class Board {
         this.events = element("div", { class: "events" });
         this.parts = [
             this.section("Motion", this.motion()),
-            this.section("States and faults", this.charts.add(this.states()), this.events),
+            this.section("States, faults and requirements", this.charts.add(this.states()), this.events),
             this.section("Tool", this.charts.add(this.tool())),
             this.section("Axes", ...AXES.map((axis, number) => this.axis(axis, number))),
             this.section("Bus and loop", element("div", { class: "row two" }, ...this.bus().map((chart) => this.charts.add(chart)))),
@@ -79,7 +79,7 @@ class Board {
         return new Chart(this.charts, { title: "State of the controller", unit: "", height: 76, paint, series });
     }
 
-    /** The states of a run in their colours, its cycles and its faults. */
+    /** The states of a run in their colours, its cycles, its faults, and where it came nearest to the limits of its requirements. */
     strip(plot, run, top, height) {
         const { left, width } = plot.bbox;
         const ratio = devicePixelRatio;
@@ -99,6 +99,21 @@ class Board {
         run.drawing.cycles.forEach((t) => context.fillRect(place(t), top, ratio, height / 4));
         context.fillStyle = colour("alarm");
         run.faults.forEach(({ time_s: t }) => context.fillRect(place(t) - ratio, top, 3 * ratio, height));
+        for (const { met, time_s: t } of run.results.requirements) {
+            if (t !== null) {
+                this.wedge(context, place(t), top + height, 5 * ratio, colour(met ? "good" : "bad"));
+            }
+        }
+    }
+
+    /** A wedge that points up, to a moment. */
+    wedge(context, x, y, size, paint) {
+        context.fillStyle = paint;
+        context.beginPath();
+        context.moveTo(x, y - 1.6 * size);
+        context.lineTo(x + size, y);
+        context.lineTo(x - size, y);
+        context.fill();
     }
 
     tool() {
@@ -163,8 +178,9 @@ class Board {
     }
 
     list() {
-        const link = ({ time_s: t, text }) => element("li", {}, element("a", { href: `#t=${t.toFixed(4)}` }, `${t.toFixed(3)} s`), ` ${text}`);
-        const { faults } = this.runs[0];
-        this.events.replaceChildren(faults.length ? element("ul", {}, ...faults.map(link)) : element("p", {}, "No fault."));
+        const [{ faults, results }] = this.runs;
+        const fault = ({ time_s: t, text }) => element("li", {}, momentLink(t), ` ${text}`);
+        const table = requirements(results.requirements);
+        this.events.replaceChildren(...(faults.length ? [element("ul", {}, ...faults.map(fault))] : [element("p", {}, "No fault.")]), ...table);
     }
 }

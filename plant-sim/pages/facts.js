@@ -27,11 +27,58 @@ function facts({ results }) {
     ];
 }
 
+/** How a run ended, in a few words. */
+function outcome({ completed, stopped, ends, error, requirements: all }) {
+    const missed = all.filter(({ met }) => !met).length;
+    const judged = missed > 0 ? `, ${missed} of ${all.length} requirements missed` : all.length > 0 ? ", every requirement met" : "";
+    if (ends === "stopped") {
+        return (completed ? "completed, though it was to be stopped" : stopped ? "stopped, as it was to be" : `not stopped: ${error}`) + judged;
+    }
+    return (completed ? "completed" : `not completed: ${error}`) + judged;
+}
+
+/** A link to a moment of the run. */
+function momentLink(t) {
+    return element("a", { href: `#t=${t.toFixed(4)}` }, `${t.toFixed(3)} s`);
+}
+
+/** The moment that the link of the page leads to, if it does. */
+function momentOfLink() {
+    const [, t] = /^#t=([\d.]+)$/.exec(location.hash) ?? [];
+    return t === undefined ? null : +t;
+}
+
+/** What is required, in a sentence: "tracking_error_mm of the elbow at most 0.1 in cycle 2". */
+function limitOf({ quantity, axis, state, min, max, cycle, during }) {
+    const of = axis ? ` of the ${axis}` : state ? ` of ${state}` : "";
+    const limit = min === undefined ? `at most ${max}` : max === undefined ? `at least ${min}` : `${min} to ${max}`;
+    const where = (cycle ? ` in cycle ${cycle}` : "") + (during ? ` from ${during[0]} to ${during[1]} s` : "");
+    return `${quantity}${of} ${limit}${where}`;
+}
+
+/** The requirements of a run with their verdicts: a table, or nothing where there are none. */
+function requirements(all) {
+    if (all.length === 0) {
+        return [];
+    }
+    const row = (verdict) => {
+        const { id, text, met, value, margin, time_s: t } = verdict;
+        const word = element("span", { class: met ? "good" : "bad" }, met ? "met" : "missed");
+        const when = t === null ? "never measured" : momentLink(t);
+        const cells = [word, text, limitOf(verdict), digits(value), digits(margin), when];
+        return element("tr", {}, element("th", { scope: "row" }, id), ...cells.map((cell) => element("td", {}, cell)));
+    };
+    const heads = ["Requirement", "Verdict", "Text", "Limit", "Value", "Margin", "Nearest at"];
+    const head = element("thead", {}, element("tr", {}, ...heads.map((name) => element("th", { scope: "col" }, name))));
+    const table = element("table", { class: "verdicts" }, head, element("tbody", {}, ...all.map(row)));
+    return [element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Requirements" }, table)];
+}
+
 /** A run's name in a line, and whether it got to its end. */
 function title(run, number, all) {
     const { results } = run;
     const key = all.length > 1 ? element("span", { class: `key key-${RUN_COLOURS[number]}` }, "AB"[number]) : null;
-    const verdict = results.completed ? element("span", { class: "good" }, "completed") : element("span", { class: "bad" }, `not completed: ${results.error}`);
+    const verdict = element("span", { class: results.passed ? "good" : "bad" }, outcome(results));
     return element("p", { class: "title" }, key, `${all.length > 1 ? ` ${results.scenario}: ` : ""}${results.law}, ${results.payload_kg} kg, ${results.rate_hz} Hz, ${results.cycles} ${results.cycles === 1 ? "cycle" : "cycles"} – `, verdict);
 }
 

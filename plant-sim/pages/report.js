@@ -24,11 +24,11 @@ function report() {
 
     // A moment has a link: #t=1.234 shows it.
     const follow = () => {
-        const [, t] = /^#t=([\d.]+)$/.exec(location.hash) ?? [];
-        if (t !== undefined) {
-            board.moment(+t);
+        const t = momentOfLink();
+        if (t !== null) {
+            board.moment(t);
         }
-        return t !== undefined;
+        return t !== null;
     };
     addEventListener("hashchange", follow);
     if (!follow() && motionAllowed()) {

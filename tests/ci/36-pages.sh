@@ -35,7 +35,7 @@ size=$(stat -c %s "$work/gate/report.html")
 run without --no-report
 [ ! -e "$work/without/report.html" ] || fail "--no-report leaves a report"
 refused "report.html: cannot be read" "$plant_sim" report "$work/gate" "$work/without"
-node tests/pages/report.mjs "$work/gate" "$work/failed" "$work/compare.html" "$pictures"
+node tests/pages/report.mjs "$work/gate" "$work/failed" "$work/other" "$work/compare.html" "$pictures"
 
 echo "- the page that runs the simulation"
 need_cross wasm32-unknown-unknown

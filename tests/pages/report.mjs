@@ -1,12 +1,12 @@
 // The page about a run, in a browser:
 //
-//   node tests/pages/report.mjs FOLDER-OF-A-RUN FAILED-RUN COMPARISON.html PICTURES
+//   node tests/pages/report.mjs FOLDER-OF-A-RUN FAILED-RUN RUN-WITH-MISSED-REQUIREMENTS COMPARISON.html PICTURES
 //
 // Pictures of every screen go into the last folder.
 import { readFileSync } from "node:fs";
 import { SCREENS, accessible, check, pixels, sound, unlike, withBrowser } from "./browser.mjs";
 
-const [run, failed, comparison, pictures] = process.argv.slice(2);
+const [run, failed, missed, comparison, pictures] = process.argv.slice(2);
 const CHARTS = [
     "State of the controller", "Tool error", "Bus load", "Loop time",
     ...["Shoulder", "Elbow", "Lift", "Wrist"].flatMap((axis) => [`${axis} position`, `${axis} error`, `${axis} ${axis === "Lift" ? "force" : "torque"}`]),
@@ -31,16 +31,21 @@ function middle({ data, width }, [red, green, blue]) {
     return { count, x: x / count, y: y / count };
 }
 
+/** Red, green and blue of a colour of the style sheet. */
+function rgb(page, name) {
+    return page.evaluate((colour) => {
+        const hex = getComputedStyle(document.documentElement).getPropertyValue(`--${colour}`).trim();
+        return [1, 3, 5].map((place) => parseInt(hex.slice(place, place + 2), 16));
+    }, name);
+}
+
 // The slider takes whole milliseconds in their shortest form alone; a time of the table has a digit of rounding.
 const seek = (page, t) => page.getByLabel("Time", { exact: true }).fill(String(Number(t.toFixed(3))));
 
 /** The arm is where the truth has it: the middle of what is drawn of it moves as the middle of the links does. */
 async function armFollowsTheTruth(page) {
     const name = "The arm from above, with the path of its tool";
-    const body = await page.evaluate(() => {
-        const hex = getComputedStyle(document.documentElement).getPropertyValue("--body").trim();
-        return [1, 3, 5].map((place) => parseInt(hex.slice(place, place + 2), 16));
-    });
+    const body = await rgb(page, "body");
     const rows = truth();
     const reach = rows.map(({ q1 }) => q1);
     const [one, other] = [Math.min(...reach), Math.max(...reach)].map((q1) => rows[reach.indexOf(q1)]);
@@ -102,6 +107,25 @@ async function buttonsAct(page) {
     check(unlike(path, await pixels(page, "The path of the tool, reference and actual")) > 20, "the deviation is not magnified");
 }
 
+/** Every requirement has its verdict, a mark among the states, and a link to the moment at which it was nearest to its limit. */
+async function requirementsLeadToTheirMoments(page, folder) {
+    const { requirements } = JSON.parse(readFileSync(`${folder}/summary.json`, "utf8"));
+    const rows = page.getByRole("region", { name: "Requirements" }).locator("tbody tr");
+    check((await rows.count()) === requirements.length, `${await rows.count()} requirements`);
+    for (const [index, { id, met, time_s: t }] of requirements.entries()) {
+        const row = rows.nth(index);
+        const text = await row.innerText();
+        check(text.startsWith(id) && text.includes(met ? "met" : "missed"), `requirement ${id}: ${text}`);
+        await row.getByRole("link").press("Enter");
+        await page.waitForFunction((at) => Math.abs(document.querySelector("input[aria-label=Time]").value - at) < 0.002, t);
+    }
+    await page.getByLabel("What the charts show").selectOption({ label: "Whole run" });
+    for (const name of new Set(requirements.map(({ met }) => (met ? "good" : "bad")))) {
+        const { count } = middle(await pixels(page, "State of the controller over time"), await rgb(page, name));
+        check(count > 10, `${count} pixels of a wedge in the colour ${name}`);
+    }
+}
+
 async function everythingIsDrawn(page) {
     for (const name of CHARTS) {
         const picture = await pixels(page, name);
@@ -112,7 +136,7 @@ async function everythingIsDrawn(page) {
 
 await withBrowser(async (open) => {
     for (const screen of SCREENS) {
-        for (const [name, file] of [["report", `${run}/report.html`], ["failed", `${failed}/report.html`], ["comparison", comparison]]) {
+        for (const [name, file] of [["report", `${run}/report.html`], ["failed", `${failed}/report.html`], ["missed", `${missed}/report.html`], ["comparison", comparison]]) {
             const page = await open(file, "", screen);
             await seek(page, 0.6);
             await page.screenshot({ path: `${pictures}/${name}-${screen.name}.png` });
@@ -128,6 +152,8 @@ await withBrowser(async (open) => {
     await armFollowsTheTruth(page);
     await chartsShareCursorAndZoom(page);
     await buttonsAct(page);
+    await requirementsLeadToTheirMoments(page, run);
+    await requirementsLeadToTheirMoments(await open(`${missed}/report.html`), missed);
 
     const moved = await open(`${run}/report.html`, "", SCREENS[0], "no-preference");
     await moved.waitForFunction(() => Number(document.querySelector("input[aria-label=Time]").value) > 0);
