@@ -6,6 +6,12 @@ const LAWS = [
     "pid", "pd-gravity", "kinematic-joint", "kinematic-task",
 ];
 
+/** Faults to choose from, each in the words of docs/faults.md, without the time. */
+const FAULTS = [
+    "none", "encoder:elbow:stuck", "encoder:shoulder:jump=0.01", "encoder:wrist:reversed", "motor:elbow:weak=0.5", "motor:lift:dead", "motor:shoulder:runaway",
+    "command:loss=0.2", "command:delay=0.003", "feedback:corrupt", "drives:silent", "brake:stuck", "payload:dropped",
+];
+
 /** All that can be set: name in the link, label, range and step or choices, value at the start, unit. */
 const SETTINGS = [
     { key: "law", label: "Control law", choices: LAWS, start: LAWS[0] },
@@ -20,6 +26,8 @@ const SETTINGS = [
     { key: "y", label: "Gate, y of its middle", from: -500, to: 500, step: 10, start: 0, unit: "mm" },
     { key: "width", label: "Gate, width", from: 50, to: 500, step: 10, start: 300, unit: "mm" },
     { key: "height", label: "Gate, height", from: 5, to: 200, step: 5, start: 25, unit: "mm" },
+    { key: "fault", label: "Fault", choices: FAULTS, start: "none" },
+    { key: "at", label: "Fault, when", from: 0.3, to: 1, step: 0.02, start: 0.4, unit: "s" },
 ];
 
 /** z of the flange at the ends of the gate, m. */
@@ -49,7 +57,7 @@ cycles = 1
 rate_hz = ${set.rate}
 law = "${set.law}"
 start = ${pose(-1)}
-${payload}
+${set.fault === "none" ? "" : `faults = ["${set.fault}@${set.at}s"]\n`}${payload}
 [gains]
 bandwidth = ${corner(set.bandwidth, set)}
 damping = ${set.damping}
@@ -96,8 +104,25 @@ class WhatIf {
         const results = element("div", { class: "results" }, this.verdict, ...this.board.parts, same, this.board.dock);
         document.querySelector("main").replaceChildren(element("h1", {}, "The bench in a page"), element("div", { class: "bench" }, panel, results));
         this.simulation = new Simulation(document.getElementById("module").textContent, (answer) => this.show(answer));
-        addEventListener("hashchange", () => this.take(fromLink()));
+        addEventListener("hashchange", () => this.follow());
         this.ask();
+    }
+
+    /** The link leads to a moment of the run, or to other settings. */
+    follow() {
+        const t = momentOfLink();
+        if (t === null) {
+            this.take(fromLink());
+        } else {
+            this.board.moment(t);
+            this.link();
+        }
+    }
+
+    /** The link of the page names the settings. */
+    link() {
+        const named = SETTINGS.filter(({ key, start }) => this.set[key] !== start).map(({ key }) => [key, this.set[key]]);
+        history.replaceState(null, "", `#${new URLSearchParams(named)}`);
     }
 
     control(setting) {
@@ -126,8 +151,7 @@ class WhatIf {
     take(set) {
         this.set = set;
         this.controls.forEach(({ say }) => say());
-        const named = SETTINGS.filter(({ key, start }) => set[key] !== start).map(({ key }) => [key, set[key]]);
-        history.replaceState(null, "", `#${new URLSearchParams(named)}`);
+        this.link();
         this.ask();
     }
 
