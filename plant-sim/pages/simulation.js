@@ -24,6 +24,13 @@ function simulator() {
     };
 }
 
+/** The bytes of a gzipped file in base64. */
+async function unpacked(base64) {
+    const packed = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
 class Simulation {
     /** @param onAnswer is called with the answer to the newest request: what has run, or an error */
     constructor(base64, onAnswer) {
@@ -38,9 +45,19 @@ class Simulation {
                 onAnswer(data);
             }
         };
-        this.busy = false;
+        // Until the module is there.
+        this.busy = true;
         this.next = null;
-        this.worker.postMessage({ module: Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0)) });
+        unpacked(base64).then(
+            (module) => {
+                this.worker.postMessage({ module });
+                this.busy = false;
+                if (this.next) {
+                    this.ask(this.next);
+                }
+            },
+            (error) => onAnswer({ error: `The simulation cannot be unpacked: ${error}. Open the page in a newer browser.` }),
+        );
     }
 
     /** Runs a request; one that comes while another runs waits, and the newest alone is answered. */

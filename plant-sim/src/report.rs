@@ -4,11 +4,13 @@
 //! sheet, and the library that draws curves. A page carries its runs as JSON; a page about two runs is made from the
 //! pages of each.
 
-use std::io;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use serde::Serialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
@@ -124,8 +126,14 @@ fn of_runs(title: &str, runs: &[String]) -> String {
 }
 
 /// The page that runs the simulation: `module` is the crate `web` as WebAssembly.
+///
+/// # Panics
+/// Never: memory takes all that is written.
 pub fn what_if(module: &[u8]) -> String {
-    let module = BASE64_STANDARD.encode(module);
+    let mut packed = GzEncoder::new(Vec::new(), Compression::best());
+    packed.write_all(module).expect("memory takes it");
+    let packed = packed.finish().expect("memory takes it");
+    let module = BASE64_STANDARD.encode(packed);
     let data = format!(r#"<script type="text/plain" id="module">{module}</script>"#);
     let own = [
         include_str!("../pages/simulation.js"),
