@@ -177,6 +177,12 @@ pub fn tanh(x: f32) -> f32 {
     clamp(x * p / q, -1.0, 1.0)
 }
 
+/// The smaller of two numbers; `a` if either is NaN. A compare and a move, unlike `f32::min`.
+#[must_use]
+pub fn least(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
 /// `x` limited to [`lower`, `upper`]; NaN stays NaN.
 ///
 /// Unlike `f32::clamp` it does not panic for crossed limits (the lower one wins), and unlike `f32::min` and `max` it is

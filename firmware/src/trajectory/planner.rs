@@ -49,7 +49,10 @@ const NO_TRAVEL: f32 = 1e-6;
 enum Stage {
     Idle,
     /// Path to the target.
-    Locate,
+    Locate {
+        /// Its joint positions.
+        end: Result<Vector4<f32>, Refusal>,
+    },
     Survey {
         point: u8,
         fastest: Vector4<f32>,
@@ -173,13 +176,16 @@ impl Planner {
         self.draft.sequence
     }
 
-    /// Takes a request for a move from the joint positions `from`.
-    pub fn begin(&mut self, request: &Request, from: &Vector4<f32>) {
+    /// Takes a request for a move from the joint positions `from`, and finds its end: inverse kinematics are as much as a step
+    /// of planning.
+    pub fn begin(&mut self, arm: &ArmModel, request: &Request, from: &Vector4<f32>) {
         self.target = request.target;
         self.speed = request.speed;
         self.draft.sequence = request.sequence;
         self.draft.end = *from;
-        self.stage = Stage::Locate;
+        self.stage = Stage::Locate {
+            end: request.target.end(arm, from),
+        };
     }
 
     /// One step of planning: one sample of the move, or one profile. When the plan is complete, `Ok`
@@ -187,7 +193,7 @@ impl Planner {
     pub fn work(&mut self, budget: &TorqueBudget<'_>) -> Option<Result<(), Refusal>> {
         let step = match self.stage {
             Stage::Idle => return None,
-            Stage::Locate => self.locate(budget.arm),
+            Stage::Locate { end } => self.locate(budget.arm, end),
             Stage::Survey { point, fastest } => self.survey(budget, point, fastest),
             Stage::Raise { down } => {
                 self.raise(budget, down);
@@ -237,11 +243,15 @@ impl Planner {
     }
 
     /// The path to the target.
-    fn locate(&mut self, arm: &ArmModel) -> Result<(), Refusal> {
+    fn locate(
+        &mut self,
+        arm: &ArmModel,
+        end: Result<Vector4<f32>, Refusal>,
+    ) -> Result<(), Refusal> {
         if !(self.speed > 0.0 && self.speed <= 1.0) {
             return Err(Refusal::value(RefusalReason::OutOfRange, self.speed, 1.0));
         }
-        let (path, gate) = self.target.path(arm, &self.draft.end)?;
+        let (path, gate) = self.target.path(arm, &self.draft.end, &end?)?;
         self.jump = gate.map(Jump::new);
         self.draft.path = path;
         self.draft.start = 0.0;

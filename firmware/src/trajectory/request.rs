@@ -56,30 +56,35 @@ pub(super) struct Gate {
 }
 
 impl Target {
-    /// The path from the joint positions `from`, and the heights of a jump over it.
+    /// Joint positions at the end of a move from the joint positions `from`.
     ///
     /// # Errors
     /// A target that is not finite, out of reach or outside a limit.
+    pub(super) fn end(&self, arm: &ArmModel, from: &Vector4<f32>) -> Result<Vector4<f32>, Refusal> {
+        match self {
+            Self::Joints(q) => check_limits(arm, q, None).map_err(from_ik).map(|()| *q),
+            Self::Line(pose, posture) | Self::Jump { pose, posture, .. } => {
+                joints_of(arm, pose, *posture, from)
+            }
+        }
+    }
+
+    /// The path from the joint positions `from` to those at the end, and the heights of a jump over it.
+    ///
+    /// # Errors
+    /// A line that would have to change the side of the elbow; the top of a jump outside its bounds.
     pub(super) fn path(
         &self,
         arm: &ArmModel,
         from: &Vector4<f32>,
+        end: &Vector4<f32>,
     ) -> Result<(Path, Option<Gate>), Refusal> {
         match self {
-            Self::Joints(q) => {
-                check_limits(arm, q, None).map_err(from_ik)?;
-                Ok((straight(from, q), None))
-            }
-            Self::Line(pose, posture) => Ok((line(arm, from, pose, *posture)?, None)),
-            Self::Jump {
-                pose,
-                posture,
-                top,
-                clearance,
-            } => {
-                let q = joints_of(arm, pose, *posture, from)?;
-                let gate = gate(arm, from, &q, *top, *clearance)?;
-                let mut across = q;
+            Self::Joints(_) => Ok((straight(from, end), None)),
+            Self::Line(pose, posture) => Ok((line(arm, from, end, pose, *posture)?, None)),
+            Self::Jump { top, clearance, .. } => {
+                let gate = gate(arm, from, end, *top, *clearance)?;
+                let mut across = *end;
                 across.z = from.z;
                 Ok((straight(from, &across), Some(gate)))
             }
@@ -114,11 +119,16 @@ fn joints_of(
     kinematics::locate(arm, pose, elbow, wrist).map_err(from_ik)
 }
 
-fn line(arm: &ArmModel, from: &Vector4<f32>, to: &Pose, posture: Posture) -> Result<Path, Refusal> {
+fn line(
+    arm: &ArmModel,
+    from: &Vector4<f32>,
+    end: &Vector4<f32>,
+    to: &Pose,
+    posture: Posture,
+) -> Result<Path, Refusal> {
     let elbow = Elbow::of(from);
-    let end = joints_of(arm, to, posture, from)?;
     // Stretched it is at both sides, and no line can begin there anyway.
-    if Elbow::of(&end) != elbow && end.y != 0.0 {
+    if Elbow::of(end) != elbow && end.y != 0.0 {
         return Err(Refusal::because(RefusalReason::ElbowSide));
     }
     let start = kinematics::forward(&arm.geometry, from);
@@ -126,7 +136,7 @@ fn line(arm: &ArmModel, from: &Vector4<f32>, to: &Pose, posture: Posture) -> Res
     let turned = if posture.turn == WristTurn::Nearest {
         wrap(to.yaw - start.yaw)
     } else {
-        yaw(&end) - yaw(from)
+        yaw(end) - yaw(from)
     };
     Ok(Path::Line {
         start,

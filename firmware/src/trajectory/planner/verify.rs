@@ -4,6 +4,7 @@ use nalgebra::Vector4;
 use protocol::messages::Refusal;
 
 use super::{Planner, Stage};
+use crate::mechanics::math::least;
 use crate::trajectory::Trajectory;
 use crate::trajectory::path::Path;
 use crate::trajectory::request::from_path;
@@ -25,15 +26,18 @@ impl Planner {
         before: Option<(f32, Vector4<f32>)>,
     ) -> Result<(), Refusal> {
         let reference = self.draft.at(budget.arm, t).map_err(from_path)?;
-        let mut time_scale = time_scale.min(budget.torque_scale(&reference));
+        let mut time_scale = least(time_scale, budget.torque_scale(&reference));
         if matches!(self.draft.path, Path::Line { .. }) {
             let jerk = before.map_or_else(Vector4::zeros, |(earlier, qdd)| {
                 (reference.qdd - qdd) / (t - earlier)
             });
-            time_scale = time_scale.min(budget.derivative_scale(&reference, &jerk, LINE_SHARE));
+            time_scale = least(
+                time_scale,
+                budget.derivative_scale(&reference, &jerk, LINE_SHARE),
+            );
         } else {
             // The profile keeps each joint within its own limits; but lift and wrist share a motor.
-            time_scale = time_scale.min(budget.lift_motor_scale(&reference.qd));
+            time_scale = least(time_scale, budget.lift_motor_scale(&reference.qd));
         }
         self.stage = if t < self.draft.span {
             Stage::Verify {
@@ -79,14 +83,15 @@ impl Planner {
         let step = span / f32::from(steps);
         // A border next to the last sample adds nothing, and rounding must not stall the pass.
         let soon = t + 0.05 * step;
-        let mut next = (t + step).min(*span);
-        next = next.min(start + profile.border_after(soon - start));
+        let mut next = least(t + step, *span);
+        next = least(next, start + profile.border_after(soon - start));
         if let Some(lift) = lift {
-            next = next.min(if soon < lift.down_start {
-                lift.up.border_after(soon).min(lift.down_start)
+            let border = if soon < lift.down_start {
+                least(lift.up.border_after(soon), lift.down_start)
             } else {
                 lift.down_start + lift.down.border_after(soon - lift.down_start)
-            });
+            };
+            next = least(next, border);
         }
         next
     }
