@@ -71,7 +71,7 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::BadValue => "value in the feedback; once in a torque of the law",
         Cause::FollowingError => "reference against encoder",
         Cause::OverSpeed => "speed of the encoder",
-        Cause::OverTorque => "torques cut to their limits: samples with less those without",
+        Cause::OverTorque => "a torque cut to its limit while the axis hardly moves",
         Cause::SoftLimit => "position against range",
         Cause::EStop => "emergency stop on the bus",
         Cause::DriveFault => "status of the drives",

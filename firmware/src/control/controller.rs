@@ -27,7 +27,7 @@ use crate::control::monitor::Monitor;
 use crate::control::phase::{Phase, Probe};
 use crate::control::setup::Setup;
 use crate::control::states::State;
-use crate::mechanics::arm::ArmModel;
+use crate::mechanics::arm::{ArmModel, Axis};
 use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::clamp;
@@ -39,6 +39,9 @@ use requests::Answer;
 const PLANNING_STEPS_PER_MS: f32 = 1.0;
 /// Most planning steps per sample: below 100 Hz, planning is no faster than at 100 Hz.
 const MAX_PLANNING_STEPS: f32 = 10.0;
+
+/// Share of its greatest speed below which an axis hardly moves. It passes that within milliseconds when it turns back.
+const SLOW: f32 = 0.1;
 
 /// Configuration, fixed at start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -110,7 +113,7 @@ pub struct Controller {
     limits: LimitFlags,
     /// First fault since the last reset.
     fault: Fault,
-    /// Samples at a torque limit, less those below all of them.
+    /// Samples in which an axis hardly moved at its torque limit, since the last move began.
     saturated: u32,
     /// A fault not reported to the peers yet.
     alarm: Option<Fault>,
@@ -327,9 +330,10 @@ impl Controller {
         probe.end(Phase::Law);
         let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
         self.excess = limited.excess;
-        self.limits = self.limits | limited.flags;
-        if limited.flags != LimitFlags::EMPTY || self.saturated > 0 {
-            self.strain(limited.flags);
+        if limited.flags != LimitFlags::EMPTY {
+            self.limits = self.limits | limited.flags;
+            let qd = motion.qd;
+            self.strain(&qd);
         }
         probe.end(Phase::Limits);
         Actions {
@@ -338,22 +342,25 @@ impl Controller {
         }
     }
 
-    /// Counts samples at a torque limit, less those below all of them. A planned move has a reserve: an axis that stays at its
-    /// limit meets something that the model does not have.
+    /// Counts samples in which an axis hardly moves at its torque limit. An axis that speeds up may be at its limit; one that
+    /// stays there where it is meets something that the model does not have.
     // Out of line: rare in a sample.
     #[inline(never)]
-    fn strain(&mut self, flags: LimitFlags) {
-        if flags == LimitFlags::EMPTY {
-            self.saturated = self.saturated.saturating_sub(1);
+    fn strain(&mut self, qd: &Vector4<f32>) {
+        let slow = self.config.arm.limits.velocity * SLOW;
+        let stands =
+            |axis: &Axis| axis.of(&self.excess) != 0.0 && axis.of(qd).abs() < axis.of(&slow);
+        let Some(axis) = Axis::ALL.into_iter().find(stands) else {
             return;
-        }
+        };
         self.saturated += 1;
         let time = self.saturated as f32 * self.config.period.seconds();
         let limit = self.setup.saturation_time;
         if time >= limit {
-            let fault = Fault::value(Cause::OverTorque, time * 1e3, limit * 1e3);
-            let axis = limits::first_axis(flags);
-            self.fail(Fault { axis, ..fault });
+            self.fail(Fault {
+                axis: axis.into(),
+                ..Fault::value(Cause::OverTorque, time * 1e3, limit * 1e3)
+            });
         }
     }
 

@@ -23,8 +23,8 @@ pub const MAX_GAP_MS: u32 = milliseconds(Parameter::FeedbackGap);
 /// Age of the feedback at which the drives count as silent, ms: the watchdog time of moteus and the heartbeat of ODrive.
 /// The drives have switched off long before, after 5 samples without a command.
 pub const PEER_TIMEOUT_MS: u32 = milliseconds(Parameter::FeedbackTimeout);
-/// Time at a torque limit that stops the arm, ms: longer than one quick move, which a load heavier than announced may keep
-/// at the limit, and short beside the seconds in which a motor at its peak torque heats up.
+/// Time at a torque limit of an axis that hardly moves, ms: longer than any start or turning back takes, and short beside the
+/// seconds in which a motor at its peak torque heats up.
 pub const SATURATION_MS: u32 = milliseconds(Parameter::SaturationTime);
 /// Consecutive rejected, stale or repeated feedback frames that stop the arm: two can be noise, and even at 500 Hz
 /// three last no longer than an allowed gap.

@@ -3,7 +3,7 @@
 //! Saturation is not a fault: a cut only sets a flag in the state message and holds the integrals.
 
 use nalgebra::Vector4;
-use protocol::messages::{FaultAxis, LimitFlags};
+use protocol::messages::LimitFlags;
 
 use crate::mechanics::arm::ArmModel;
 use crate::mechanics::dynamics::drive::Drive;
@@ -46,12 +46,6 @@ pub fn cut(arm: &ArmModel, drive: &Drive, torque: &Vector4<f32>) -> Limited {
         excess,
         flags,
     }
-}
-
-/// The first axis whose torque was cut.
-pub fn first_axis(flags: LimitFlags) -> FaultAxis {
-    // Torques have the lowest bits, in the order of the axes; codes of axes begin at 1.
-    FaultAxis::try_from(flags.bits().trailing_zeros() as u8 + 1).unwrap_or(FaultAxis::None)
 }
 
 /// `torque` cut to a magnitude; NaN stays NaN.

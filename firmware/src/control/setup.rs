@@ -23,7 +23,7 @@ pub struct Setup {
     pub monitor: MonitorLimits,
     /// Age of the feedback at which the drives count as silent, s.
     pub feedback_timeout: f32,
-    /// Time at a torque limit that stops the arm, s.
+    /// Time at a torque limit of an axis that hardly moves that stops the arm, s.
     pub saturation_time: f32,
     /// Rejected, stale or duplicate feedback frames in a row that stop the arm.
     pub bad_frames: u32,

@@ -217,7 +217,7 @@ codes! {
         FollowingError = 11, "following-error";
         /// An axis is faster than allowed.
         OverSpeed = 12, "over-speed";
-        /// An axis has been at its torque limit for too long: it is blocked, overloaded, or its loop chatters.
+        /// An axis that hardly moves has been at its torque limit for too long: it is blocked, or its loop chatters.
         OverTorque = 13, "over-torque";
         /// An axis has left its range.
         SoftLimit = 14, "soft-limit";

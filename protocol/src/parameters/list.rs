@@ -96,7 +96,7 @@ parameters! {
         FeedbackGap = 0x0032, "feedback-gap", "s", Always, real(0.001, 0.02, 0.005);
         /// Rejected, stale or duplicate feedback frames in a row that stop the arm.
         BadFrames = 0x0033, "bad-frames", "frames", Always, whole(1.0, 20.0, 3.0);
-        /// Time at a torque limit, less the time below all limits, that stops the arm.
+        /// Time in one move at a torque limit of an axis that hardly moves that stops the arm.
         SaturationTime = 0x0034, "saturation-time", "s", Always, real(0.02, 10.0, 0.2);
     }
 }

@@ -51,6 +51,7 @@ impl Controller {
                 return;
             }
             self.event(Event::Start);
+            self.saturated = 0;
         }
         let stopping = self.state.is_stopping();
         let budget = TorqueBudget {
