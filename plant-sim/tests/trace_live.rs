@@ -46,8 +46,9 @@ fn piped(subcommand: &str) -> Child {
 #[test]
 fn an_output_never_replaces_its_input() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("precious.log");
-    let link = folder.path().join("link.log");
+    // A drawing has to be named .svg, so the trace is, too.
+    let path = folder.path().join("precious.svg");
+    let link = folder.path().join("link.svg");
     fs::write(&path, FOREIGN).unwrap();
     fs::hard_link(&path, &link).unwrap();
     let trace_text = path.to_str().unwrap();
