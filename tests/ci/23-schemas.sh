@@ -16,7 +16,7 @@ summary() { # summary NAME ARGUMENT...
 }
 summary run --cycles 2 --json
 cmp "$work/run.out" "$work/run/summary.json"
-summary robots --cycles 1 --plant-model plant-sim/models/irb930-12-0.85.json
+summary robots --set requirements=[] --cycles 1 --plant-model plant-sim/models/irb930-12-0.85.json
 sed 's/^friction = .*/friction = 9/; s/^payload = .*/payload = 9/' plant-sim/scenarios/gate-mismatch.toml >"$work/fault.toml"
 summary fault --scenario "$work/fault.toml"
 grep -q '"completed": false' "$work/fault/summary.json"
