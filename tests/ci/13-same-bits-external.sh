@@ -9,10 +9,10 @@ port=$((20000 + RANDOM % 10000))
 
 for rate in 1000 3000; do
     port=$((port + 1))
-    "$plant_sim" run --cycles 1 --rate "$rate" --out here >/dev/null 2>here.err
+    "$plant_sim" run --cycles 1 --rate "$rate" --set requirements=[] --out here >/dev/null 2>here.err
     "$controller" --bus "slcan:listen:127.0.0.1:$port" --rate "$rate" 2>controller.err & process=$!
     await controller.err "waiting for the drives"
-    timeout 90 "$plant_sim" run --cycles 1 --rate "$rate" --bus "slcan:tcp:127.0.0.1:$port" --controller external --out there \
+    timeout 90 "$plant_sim" run --cycles 1 --rate "$rate" --set requirements=[] --bus "slcan:tcp:127.0.0.1:$port" --controller external --out there \
         >/dev/null 2>there.err || fail "run with an external controller at $rate Hz"
     kill -INT $process && wait $process || fail "Ctrl-C did not end the controller cleanly"
     cmp here/truth.csv there/truth.csv || fail "truths differ at $rate Hz"
