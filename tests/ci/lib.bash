@@ -163,6 +163,8 @@ SelectTypeParameters=CR_Core
 NodeName=localhost CPUs=$(nproc) State=UNKNOWN
 PartitionName=all Nodes=localhost Default=YES State=UP
 END
+    # Nothing here uses control groups; to find out their version it would need them mounted, which a container may lack.
+    echo CgroupPlugin=cgroup/v1 >"$slurm/cgroup.conf"
     munged --foreground --force --key-file="$slurm/key" --socket="$slurm/socket" --pid-file="$slurm/munged.pid" \
         --log-file="$slurm/munged.log" --seed-file="$slurm/seed" >"$work/munged.err" 2>&1 &
     eventually "the socket of munged" test -S "$slurm/socket"
