@@ -8,37 +8,17 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "common/scenario.rs"]
+mod common;
+
+use common::{BASE, said_of};
 use sim::scenario::{Scenario, Source};
 use sim::setup::RunConfig;
-
-const BASE: &str = "name = \"t\"
-cycles = 2
-rate_hz = 1000
-law = \"computed-torque:observer\"
-start = [0.5, 0.1, -0.2, 0.0]
-
-[payload]
-mass = 2.0
-com_flange_frame = [0.0, 0.0, 0.05]
-inertia_com_diag = [0.008, 0.008, 0.01]
-
-[[cycle]]
-jump = { to = [0.6, 0.1, -0.2, 0.0], top = -0.15, clearance = 0.005 }
-[[cycle]]
-dwell = 0.1
-";
 
 /// The refusal, before a run, of the text with one passage replaced.
 fn refusal(from: &str, to: &str) -> String {
     assert_eq!(BASE.matches(from).count(), 1, "{from}");
     said_of(&BASE.replace(from, to))
-}
-
-fn said_of(text: &str) -> String {
-    match Scenario::parse(text, "x.toml") {
-        Err(error) => error.to_string(),
-        Ok(scenario) => RunConfig::new(scenario).rig().expect_err(text).to_string(),
-    }
 }
 
 #[test]
