@@ -26,6 +26,7 @@ reordered       3 frames     stop           brake          nothing        reset
 corrupted       3 frames     stop           brake          nothing        reset
 bad-value       3 frames     off            off            off            reset
 following-error each axis    stop           brake          off            reset
+stuck-sensor    each axis    off            off            off            reset
 over-speed      each axis    stop           brake          off            reset
 over-torque     200 ms       stop           brake          nothing        reset
 soft-limit      each axis    stop           nothing        nothing        reset
@@ -70,12 +71,17 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::Corrupted => "format, length or CRC of the feedback",
         Cause::BadValue => "value in the feedback; once in a torque of the law",
         Cause::FollowingError => "reference against encoder",
+        Cause::StuckSensor => {
+            "reference, or torque at its limit, against an encoder that does not move"
+        }
         Cause::OverSpeed => "speed of the encoder",
         Cause::OverTorque => "a torque cut to its limit while the axis hardly moves",
         Cause::SoftLimit => "position against range",
         Cause::EStop => "emergency stop on the bus",
-        Cause::DriveFault => "status of the drives",
-        Cause::EncoderFault => "status of the drives; a jump no axis can make",
+        Cause::DriveFault => "status of the drives: a fault, or torque off by themselves",
+        Cause::EncoderFault => {
+            "status of the drives; a jump no axis can make; away from the reference, faster and faster, against the torque"
+        }
         other => panic!("{other} is in the table: say what detects it"),
     }
 }

@@ -16,9 +16,8 @@ use std::path::Path;
 
 use protocol::messages::{Cause, ParameterError, RefusalReason};
 
-const CAUSES: [Cause; 6] = [
+const CAUSES: [Cause; 5] = [
     Cause::DuplicateNode,
-    Cause::StuckSensor,
     Cause::Babbling,
     Cause::BusOff,
     Cause::Overrun,

@@ -197,7 +197,7 @@ fn at_rest() -> Readings {
     let q = Vector4::new(0.2, 1.5, 0.15, 0.3);
     Readings {
         steps: 1,
-        status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
+        status: DriveStatus::READY | DriveStatus::TORQUE_ON | DriveStatus::ENCODER_VALID,
         counts: drive.counts_of_motor_angle(&drive.motor_angle(&q)),
         velocity: Vector4::zeros(),
         torque: Vector4::zeros(),

@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::laws::{ControlInput, Memory, Model, Motion, Selection, Task};
 use crate::control::limits;
-use crate::control::monitor::Monitor;
+use crate::control::monitor::{Monitor, Seen};
 use crate::control::phase::{Phase, Probe};
 use crate::control::setup::Setup;
 use crate::control::states::State;
@@ -274,7 +274,13 @@ impl Controller {
         if readings.steps > 1 {
             self.bridge(readings.steps);
         }
-        self.watch(readings.status, &q, &qd);
+        let seen = Seen {
+            q: &q,
+            qd: &qd,
+            torque: &measured_torque,
+            motor: &readings.velocity,
+        };
+        self.watch(readings, &seen);
         self.wait(readings.steps);
         if !self.state.is_powered() {
             // No torque: follow the arm, so that enabling starts at its present position.
@@ -332,8 +338,7 @@ impl Controller {
         self.excess = limited.excess;
         if limited.flags != LimitFlags::EMPTY {
             self.limits = self.limits | limited.flags;
-            let qd = motion.qd;
-            self.strain(&qd);
+            self.strain(&seen);
         }
         probe.end(Phase::Limits);
         Actions {
@@ -343,13 +348,14 @@ impl Controller {
     }
 
     /// Counts samples in which an axis hardly moves at its torque limit. An axis that speeds up may be at its limit; one that
-    /// stays there where it is meets something that the model does not have.
+    /// stays there where it is meets something that the model does not have; one whose encoder does not move at all may be
+    /// anywhere.
     // Out of line: rare in a sample.
     #[inline(never)]
-    fn strain(&mut self, qd: &Vector4<f32>) {
+    fn strain(&mut self, seen: &Seen<'_>) {
         let slow = self.config.arm.limits.velocity * SLOW;
         let stands =
-            |axis: &Axis| axis.of(&self.excess) != 0.0 && axis.of(qd).abs() < axis.of(&slow);
+            |axis: &Axis| axis.of(&self.excess) != 0.0 && axis.of(seen.qd).abs() < axis.of(&slow);
         let Some(axis) = Axis::ALL.into_iter().find(stands) else {
             return;
         };
@@ -357,10 +363,13 @@ impl Controller {
         let time = self.saturated as f32 * self.config.period.seconds();
         let limit = self.setup.saturation_time;
         if time >= limit {
-            self.fail(Fault {
-                axis: axis.into(),
-                ..Fault::value(Cause::OverTorque, time * 1e3, limit * 1e3)
-            });
+            let fault = if seen.is_still(axis) {
+                Fault::value(Cause::StuckSensor, axis.of(&self.error), 0.0)
+            } else {
+                Fault::value(Cause::OverTorque, time * 1e3, limit * 1e3)
+            };
+            let axis = axis.into();
+            self.fail(Fault { axis, ..fault });
         }
     }
 

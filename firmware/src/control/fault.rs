@@ -106,7 +106,7 @@ const fn row(
 }
 
 /// Every cause that the controller raises.
-pub static REACTIONS: [Row; 13] = {
+pub static REACTIONS: [Row; 14] = {
     use Latch::{Reset, Restart};
     use Limit::{AtOnce, EachAxis, Frames, Milliseconds};
     use Reaction::{Brake, EmergencyStop, None, Off, Stop};
@@ -139,6 +139,7 @@ pub static REACTIONS: [Row; 13] = {
         // The checksum was right: the sender is wrong, or this controller's own arithmetic.
         row(Cause::BadValue, Frames(BAD_FRAMES), [Off, Off, Off], Reset),
         row(Cause::FollowingError, EachAxis, [Stop, Brake, Off], Reset),
+        row(Cause::StuckSensor, EachAxis, [Off, Off, Off], Reset),
         row(Cause::OverSpeed, EachAxis, [Stop, Brake, Off], Reset),
         row(
             Cause::OverTorque,

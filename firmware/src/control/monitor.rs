@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::mechanics::arm::{ArmModel, Axis};
 
+/// Speed of a motor up to which its encoder does not move, rad/s: some counts in a sample.
+const STILL: f32 = 0.5;
+
 /// Limits whose violation stops the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MonitorLimits {
@@ -51,6 +54,26 @@ impl MonitorLimits {
     }
 }
 
+/// What the drives report of the motion in one sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// Joint positions: rad, rad, m, rad.
+    pub q: &'a Vector4<f32>,
+    /// Joint velocities.
+    pub qd: &'a Vector4<f32>,
+    /// Joint torques and forces of the motors.
+    pub torque: &'a Vector4<f32>,
+    /// Velocities of the motors, rad/s.
+    pub motor: &'a Vector4<f32>,
+}
+
+impl Seen<'_> {
+    /// Whether the encoder of an axis does not move. Asked of the motor: the lift moves with the wrist as well.
+    pub fn is_still(&self, axis: Axis) -> bool {
+        axis.of(self.motor).abs() <= STILL
+    }
+}
+
 /// Monitor of one arm: its limits, prepared for use in every sample, and counts of consecutive violations.
 #[derive(Clone, Copy, Debug)]
 pub struct Monitor {
@@ -65,6 +88,8 @@ pub struct Monitor {
     following_count: u32,
     speed_count: u32,
     range_count: u32,
+    /// Joint speeds when an axis was first found too far from its reference.
+    first_qd: Vector4<f32>,
 }
 
 impl Monitor {
@@ -80,6 +105,7 @@ impl Monitor {
             following_count: 0,
             speed_count: 0,
             range_count: 0,
+            first_qd: Vector4::zeros(),
         };
         monitor.adopt(arm, limits);
         monitor
@@ -95,11 +121,12 @@ impl Monitor {
         self.needed = limits.samples;
     }
 
-    /// Fault that the drives report.
-    pub fn status(status: DriveStatus) -> Option<Fault> {
+    /// Fault that the drives report, where their torque has to be on or need not be.
+    pub fn status(status: DriveStatus, has_torque: bool) -> Option<Fault> {
+        let is_off = has_torque && !status.contains(DriveStatus::TORQUE_ON);
         let cause = if !status.contains(DriveStatus::ENCODER_VALID) {
             Cause::EncoderFault
-        } else if status.contains(DriveStatus::FAULT) {
+        } else if is_off || status.contains(DriveStatus::FAULT) {
             Cause::DriveFault
         } else {
             return None;
@@ -108,12 +135,8 @@ impl Monitor {
     }
 
     /// Judges one sample; `error` is reference minus measured position.
-    pub fn check(
-        &mut self,
-        q: &Vector4<f32>,
-        qd: &Vector4<f32>,
-        error: &Vector4<f32>,
-    ) -> Option<Fault> {
+    pub fn check(&mut self, seen: &Seen<'_>, error: &Vector4<f32>) -> Option<Fault> {
+        let Seen { q, qd, .. } = *seen;
         let following = first_beyond(error, &self.following_error);
         let speed = first_beyond(qd, &self.speed);
         let range = first_beyond(&(q - self.middle), &self.reach);
@@ -121,27 +144,32 @@ impl Monitor {
             self.reset();
             return None;
         }
-        self.trip(q, qd, error, [following, speed, range])
+        self.trip(seen, error, [following, speed, range])
     }
 
     /// Out of line: rarely reached in a sample.
     #[inline(never)]
     fn trip(
         &mut self,
-        q: &Vector4<f32>,
-        qd: &Vector4<f32>,
+        seen: &Seen<'_>,
         error: &Vector4<f32>,
         [following, speed, range]: [Option<Axis>; 3],
     ) -> Option<Fault> {
+        let Seen { q, qd, .. } = *seen;
         if self.following_count == 0
             && let Some(axis) = first_beyond(error, &self.jump)
         {
             // The axis still followed in the last sample.
             return Some(of_axis(Cause::EncoderFault, axis, error, &self.jump));
         }
+        if self.following_count == 0 {
+            self.first_qd = *qd;
+        }
         let needed = self.needed;
-        let following = count(&mut self.following_count, following, needed)
-            .map(|axis| of_axis(Cause::FollowingError, axis, error, &self.following_error));
+        let following = count(&mut self.following_count, following, needed).map(|axis| {
+            let cause = self.why_not_following(axis, seen, axis.of(error));
+            of_axis(cause, axis, error, &self.following_error)
+        });
         let speed = count(&mut self.speed_count, speed, needed)
             .map(|axis| of_axis(Cause::OverSpeed, axis, qd, &self.speed));
         let range = count(&mut self.range_count, range, needed).map(|axis| {
@@ -150,6 +178,22 @@ impl Monitor {
             of_axis(Cause::SoftLimit, axis, q, &limit)
         });
         following.or(speed).or(range)
+    }
+
+    /// What keeps an axis from following. A stop closes the loop through its encoder; the ways in which a wrong reading shows
+    /// therefore have causes of their own, whose reaction does without that loop. A blocked axis looks like a stuck encoder,
+    /// and needs no stop either.
+    fn why_not_following(&self, axis: Axis, seen: &Seen<'_>, error: f32) -> Cause {
+        let [qd, torque] = [seen.qd, seen.torque].map(|of| axis.of(of));
+        let leaves = qd * error < 0.0 && qd.abs() > axis.of(&self.first_qd).abs();
+        if seen.is_still(axis) {
+            Cause::StuckSensor
+        } else if leaves && torque * error > 0.0 {
+            // Faster and faster, against its torque.
+            Cause::EncoderFault
+        } else {
+            Cause::FollowingError
+        }
     }
 
     /// Forgets the counts, for a new start.

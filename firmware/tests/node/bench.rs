@@ -49,7 +49,10 @@ pub(crate) struct Bench {
     pub sequence: u8,
     pub position: [i32; 4],
     pub velocity: [f32; 4],
+    /// What the drives report besides whether torque is on.
     pub status: DriveStatus,
+    /// Whether the drives do what the control word says.
+    pub obeys: bool,
     pub follows: bool,
     period: Duration,
     drive: Drive,
@@ -72,6 +75,7 @@ impl Bench {
             position: [0; 4],
             velocity: [0.0; 4],
             status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
+            obeys: true,
             follows: false,
             period: config.period.duration(),
             drive: Drive::new(&IRB_930.drive),
@@ -130,9 +134,11 @@ impl Bench {
             self.put(&reference.q);
             self.velocity = self.drive.motor_angle(&reference.qd).into();
         }
+        let word = self.node.controller().control_word();
+        let is_on = self.obeys && word.contains(ControlWord::TORQUE_ENABLE);
         let feedback = Feedback {
             sample: self.sample,
-            status: self.status,
+            status: self.status.with(DriveStatus::TORQUE_ON, is_on),
             position: self.position,
             velocity: self.velocity,
             torque: [0; 4],

@@ -7,8 +7,8 @@ use nalgebra::Vector4;
 use protocol::e2e::Profile;
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode, MotionRequest, Outcome,
-    State,
+    Cause, ControlWord, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode,
+    MotionRequest, Outcome, State,
 };
 use protocol::time::Period;
 
@@ -71,8 +71,9 @@ fn a_silent_peer_takes_the_torque_away_and_is_reported() {
 #[test]
 fn following_error_and_drive_faults_stop_the_arm() {
     let mut bench = Bench::enabled();
-    // The elbow is pushed 0.1 rad away.
+    // The elbow is pushed 0.1 rad away and comes back slowly.
     bench.position[1] += (0.1 * 50.0 / std::f64::consts::TAU * 131_072.0) as i32;
+    bench.velocity[1] = -10.0;
     bench.run(2);
     assert_eq!(bench.mode(), Mode::Enabled, "not before the third sample");
     bench.run(2);
@@ -160,6 +161,12 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
         }
         Cause::FollowingError => {
             bench.position[1] += (0.1 * 50.0 / std::f64::consts::TAU * 131_072.0) as i32;
+            // 0.2 rad/s, back.
+            bench.velocity[1] = -10.0;
+            bench.run(3)
+        }
+        Cause::StuckSensor => {
+            bench.position[1] += (0.1 * 50.0 / std::f64::consts::TAU * 131_072.0) as i32;
             bench.run(3)
         }
         Cause::OverSpeed => {
@@ -170,6 +177,8 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
         Cause::OverTorque => {
             // 9 mm, below the limit of the following error and more than the motor can correct; 25 mm per turn.
             bench.position[2] += (0.009 / 0.025 * 131_072.0) as i32;
+            // 8 mm/s, back.
+            bench.velocity[2] = -2.0;
             bench.run(200)
         }
         Cause::SoftLimit => {
@@ -194,7 +203,6 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
         }
         Cause::None
         | Cause::DuplicateNode
-        | Cause::StuckSensor
         | Cause::Babbling
         | Cause::BusOff
         | Cause::Overrun
@@ -229,16 +237,40 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::FollowingError => {
                 "following error, axis 2 (elbow): -0.100 rad, limit 0.050 rad".into()
             }
+            Cause::StuckSensor => {
+                "stuck sensor, axis 2 (elbow): -0.100 rad, limit 0.050 rad".into()
+            }
             Cause::OverTorque => "over torque, axis 3 (lift): 200.0 ms, limit 200.0 ms".into(),
             Cause::OverSpeed => "over speed, axis 3 (lift): 2.43 m/s, limit 2.42 m/s".into(),
             Cause::SoftLimit => "soft limit, axis 2 (elbow): 2.560 rad, limit 2.551 rad".into(),
             Cause::EStop => "estop".to_owned(),
-            Cause::DriveFault => "drive fault: drive status ready fault encoder-valid".into(),
-            Cause::EncoderFault => "encoder fault: drive status ready".into(),
+            Cause::DriveFault => {
+                "drive fault: drive status ready torque-on fault encoder-valid".into()
+            }
+            Cause::EncoderFault => "encoder fault: drive status ready torque-on".into(),
             _ => String::new(),
         };
         assert_eq!(state.fault().to_string(), expected);
     }
+}
+
+/// Drives that have missed commands go on with the next one, from where the arm has coasted to: that has to be a fault.
+#[test]
+fn drives_that_switch_off_by_themselves_are_a_fault() {
+    let mut bench = Bench::moving();
+    bench.obeys = false;
+    bench.step();
+    bench.obeys = true;
+    let words = bench.words(200);
+    assert_eq!(
+        words.first(),
+        Some(&ControlWord::TORQUE_ENABLE),
+        "the brake closes at once"
+    );
+    assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
+    assert_eq!(bench.mode(), Mode::Fault);
+    let status = "drive fault: drive status ready encoder-valid";
+    assert_eq!(bench.node.controller().fault().to_string(), status);
 }
 
 /// The arm is stopped after a time, whatever the rate: 5 ms is 10 samples at 2 kHz.

@@ -69,6 +69,12 @@ impl Client {
         self.put(&joints);
     }
 
+    /// Displaces a joint that moves back slowly, and not at all like one with a stuck encoder.
+    fn swing(&mut self, axis: usize, by: f32) {
+        self.push(axis, by);
+        self.velocity[axis] = -10.0 * by.signum();
+    }
+
     /// Passes a request to the node without waiting for a sample.
     fn ask(&mut self, request: MotionRequest) {
         let frame = self.motion(request);
@@ -170,7 +176,7 @@ fn every_parameter_is_kept_by_itself() {
 #[test]
 fn a_smaller_following_error_stops_the_arm_earlier() {
     let push = |bench: &mut Client| {
-        bench.push(1, 0.03);
+        bench.swing(1, 0.03);
         bench.run(2);
         assert_eq!(bench.mode(), Mode::Enabled, "not before the third sample");
         bench.step();
@@ -189,7 +195,7 @@ fn a_smaller_following_error_stops_the_arm_earlier() {
 #[test]
 fn setting_a_limit_does_not_start_the_count_again() {
     let mut bench = Client::enabled();
-    bench.push(1, 0.1);
+    bench.swing(1, 0.1);
     bench.run(2);
     bench.set(ControllerParameter::FollowingErrorLift, 0.02);
     bench.step();
@@ -200,7 +206,7 @@ fn setting_a_limit_does_not_start_the_count_again() {
 fn fewer_fault_samples_stop_the_arm_earlier() {
     let mut bench = Client::enabled();
     bench.set(ControllerParameter::FaultSamples, 1.0);
-    bench.push(1, 0.1);
+    bench.swing(1, 0.1);
     bench.step();
     assert_eq!(bench.node.controller().cause(), Cause::FollowingError);
 }

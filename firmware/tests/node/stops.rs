@@ -91,12 +91,27 @@ fn a_stop_that_is_not_followed_ends_at_the_brake() {
     bench.wire.to_node.push_back(estop());
     bench.step();
     bench.follows = false;
-    bench.velocity = [0.0; 4];
+    // Slow, and not still, as a stuck encoder would be.
+    bench.velocity = [1.0; 4];
     let words = bench.words(60);
     let expected = [ESTOP_STOPPING, ESTOP_BRAKE, ControlWord::ESTOP];
     assert_eq!(course(&words), expected);
     let closing = words.iter().filter(|word| **word == ESTOP_BRAKE).count();
     assert_eq!(closing, 3, "three samples in a row");
+}
+
+/// No loop is closed through an encoder that does not move: torque goes off without the time of the brake.
+#[test]
+fn a_stop_through_a_stuck_encoder_ends_without_torque() {
+    let mut bench = Bench::moving();
+    bench.wire.to_node.push_back(estop());
+    bench.step();
+    bench.follows = false;
+    bench.velocity = [0.0; 4];
+    assert_eq!(
+        course(&bench.words(60)),
+        [ESTOP_STOPPING, ControlWord::ESTOP]
+    );
 }
 
 /// An undisturbed stop comes to rest on the path before the brake closes.

@@ -11,7 +11,7 @@
 use std::io;
 
 use protocol::frame::CanFrame;
-use protocol::messages::{Cause, Message};
+use protocol::messages::{Cause, Message, Mode};
 use protocol::time::Instant;
 use protocol::{codec, table};
 use sim::faults::{Fault, KINDS};
@@ -66,14 +66,27 @@ fn cause(record: &Record) -> Cause {
     causes.next().unwrap_or(Cause::None)
 }
 
+/// The modes that the controller reports.
+fn modes(record: &Record) -> Vec<Mode> {
+    let mode = |frame: &CanFrame| match codec::decode(frame).ok()?.message {
+        Message::State(state) => Some(state.mode),
+        _ => None,
+    };
+    record
+        .frames
+        .iter()
+        .filter_map(|(_, frame)| mode(frame))
+        .collect()
+}
+
 /// In motion at 0.4 s.
 const CASES: [(&str, Cause); 10] = [
     ("feedback:loss@0.4s", Cause::PeerSilent),
     ("feedback:corrupt@0.4s", Cause::Corrupted),
     ("drives:silent@0.4s", Cause::PeerSilent),
-    ("encoder:elbow:stuck@0.4s", Cause::FollowingError),
+    ("encoder:elbow:stuck@0.4s", Cause::StuckSensor),
     ("encoder:shoulder:jump=0.5@0.4s", Cause::EncoderFault),
-    ("encoder:elbow:reversed@0.4s", Cause::FollowingError),
+    ("encoder:elbow:reversed@0.4s", Cause::EncoderFault),
     ("motor:elbow:dead@0.4s", Cause::FollowingError),
     ("motor:shoulder:runaway@0.4s", Cause::FollowingError),
     ("motor:lift:dead@0.4s", Cause::FollowingError),
@@ -94,6 +107,30 @@ fn the_arm_stops_for_the_right_cause_and_stays_stopped() {
             last.qd
         );
     }
+}
+
+/// A stop closes the loop through the encoders: none begins on one that lies.
+#[test]
+fn a_lying_encoder_gets_no_controlled_stop() {
+    let mut unseen = 0;
+    for defect in ["stuck", "reversed"] {
+        for axis in ["shoulder", "elbow", "lift", "wrist"] {
+            for at in 0..40 {
+                // Until the second move ends.
+                let text = format!("encoder:{axis}:{defect}@{}ms", 50 + 17 * at);
+                let (_, record) = run(&[&text], 0);
+                match cause(&record) {
+                    Cause::StuckSensor if defect == "stuck" => {}
+                    Cause::EncoderFault if defect == "reversed" => {}
+                    // An axis that need not move any more.
+                    Cause::None => unseen += 1,
+                    other => panic!("{text}: {other}"),
+                }
+                assert!(!modes(&record).contains(&Mode::FaultReaction), "{text}");
+            }
+        }
+    }
+    assert!(unseen <= 40, "{unseen} of 320 unseen");
 }
 
 /// The controller hears nothing of its commands being lost; the drives brake by themselves.

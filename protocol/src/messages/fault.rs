@@ -153,16 +153,22 @@ impl Fault {
             (Cause::DriveFault, _) | (Cause::EncoderFault, None) => Unit::DriveStatus,
             (Cause::FeedbackLost | Cause::PeerSilent | Cause::OverTorque, _) => Unit::Millisecond,
             (Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => Unit::Frame,
-            (Cause::FollowingError | Cause::SoftLimit, None) => Unit::RadianOrMetre,
-            (Cause::FollowingError | Cause::SoftLimit | Cause::EncoderFault, Lift) => Unit::Metre,
-            (Cause::FollowingError | Cause::SoftLimit | Cause::EncoderFault, _) => Unit::Radian,
+            (Cause::FollowingError | Cause::SoftLimit | Cause::StuckSensor, None) => {
+                Unit::RadianOrMetre
+            }
+            (
+                Cause::FollowingError | Cause::SoftLimit | Cause::StuckSensor | Cause::EncoderFault,
+                axis,
+            ) => match axis {
+                Lift => Unit::Metre,
+                _ => Unit::Radian,
+            },
             (Cause::OverSpeed, None) => Unit::SpeedOfAxis,
             (Cause::OverSpeed, Lift) => Unit::MetrePerSecond,
             (Cause::OverSpeed, _) => Unit::RadianPerSecond,
             (
                 Cause::None
                 | Cause::DuplicateNode
-                | Cause::StuckSensor
                 | Cause::Babbling
                 | Cause::BusOff
                 | Cause::Overrun

@@ -205,7 +205,7 @@ codes! {
         Corrupted = 5, "corrupted";
         /// Another node sends on the identifier of a peer, or a log is replayed. Reserved: not raised yet.
         DuplicateNode = 6, "duplicate-node";
-        /// A position does not change while the axis moves. Reserved: not raised yet.
+        /// A position does not change although the axis is off its reference or at its torque limit: encoder or axis is stuck.
         StuckSensor = 7, "stuck-sensor";
         /// A node floods the bus. Reserved: not raised yet.
         Babbling = 8, "babbling";
@@ -225,11 +225,11 @@ codes! {
         Overrun = 15, "overrun";
         /// The emergency stop was pressed or sent.
         EStop = 16, "estop";
-        /// The drives report a fault.
+        /// The drives report a fault, or that they have switched off by themselves.
         DriveFault = 17, "drive-fault";
         /// The peer was built from another message table. Reserved: not raised yet.
         SchemaMismatch = 18, "schema-mismatch";
-        /// An encoder is not valid, or its position has changed by more than the axis can move in that time.
+        /// An encoder is not valid, jumps further than the axis can move, or moves against its torque, as with a wrong sign.
         EncoderFault = 19, "encoder-fault";
     }
 }

@@ -1,12 +1,11 @@
 //! Entry actions of the states, and the events that change them.
 
-use nalgebra::Vector4;
-use protocol::messages::{Cause, ControlWord, DriveStatus, Fault, LimitFlags};
+use protocol::messages::{Cause, ControlWord, Fault, LimitFlags};
 
-use super::Controller;
+use super::{Controller, Readings};
 use crate::control::fault;
 use crate::control::laws::Memory;
-use crate::control::monitor::Monitor;
+use crate::control::monitor::{Monitor, Seen};
 use crate::control::states::{Event, Halt, State};
 
 impl Controller {
@@ -71,17 +70,20 @@ impl Controller {
     }
 
     /// Watches the arm as long as torque moves or holds it, including a stop for a fault.
-    pub(super) fn watch(&mut self, status: DriveStatus, q: &Vector4<f32>, qd: &Vector4<f32>) {
+    pub(super) fn watch(&mut self, readings: &Readings, seen: &Seen<'_>) {
         if !self.state.is_powered() {
             return;
         }
-        if let Some(fault) = Monitor::status(status) {
+        // Drives that missed commands have switched off by themselves, and would go on with the next. While the brake opens or
+        // closes, they may not be on yet or any more; after too long a gap in the feedback, the stop goes on with them.
+        let has_torque = !self.state.is_braking() && readings.steps <= self.max_gap;
+        if let Some(fault) = Monitor::status(readings.status, has_torque) {
             self.fail(fault);
         }
-        let error = self.setpoint.reference.q - q;
+        let error = self.setpoint.reference.q - seen.q;
         // The reference of the last sample: at most one sample of motion older than `q`.
         let moved = self.setpoint.reference.qd * self.config.period.seconds();
-        if let Some(fault) = self.monitor.check(q, qd, &(error + moved)) {
+        if let Some(fault) = self.monitor.check(seen, &(error + moved)) {
             self.fail(fault);
         }
     }
