@@ -1,7 +1,7 @@
 //! One sample of control: states, motion, control laws, limits and faults.
 //!
 //! [`controller`] joins the parts; each of the others is pure: [`states`] the states, [`laws`] the control laws,
-//! [`limits`] what a motor can give, [`monitor`] what counts as a fault, [`fault`] the reaction to it, [`setup`] what
+//! [`readings`] what the drives report, [`limits`] what a motor can give, [`monitor`] what counts as a fault, [`fault`] the reaction to it, [`setup`] what
 //! can be changed at run time. [`phase`] is the probe that measures what each part costs. Depends on
 //! [`mechanics`](crate::mechanics) and [`trajectory`](crate::trajectory).
 
@@ -28,6 +28,7 @@ pub mod laws;
 pub mod limits;
 pub mod monitor;
 pub mod phase;
+pub mod readings;
 pub mod self_test;
 pub mod setup;
 pub mod states;

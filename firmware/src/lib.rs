@@ -18,7 +18,7 @@
 //! # The path of one Feedback frame
 //!
 //! A board or the simulator calls [`Node::poll`](node::Node::poll) when a frame has arrived. The node decodes and
-//! checks it, counts it if it is refused, and turns a fresh Feedback into [`Readings`](control::controller::Readings).
+//! checks it, counts it if it is refused, and turns a fresh Feedback into [`Readings`](control::readings::Readings).
 //! One call of [`Controller::step`](control::controller::Controller::step) follows:
 //!
 //! ```text

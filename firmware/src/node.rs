@@ -20,9 +20,10 @@ use protocol::messages::{
 use protocol::table;
 use protocol::time::{Duration, Instant};
 
-use crate::control::controller::{Config, Controller, Readings};
+use crate::control::controller::{Config, Controller};
 use crate::control::fault::PEER_TIMEOUT_MS;
 use crate::control::phase::{Phase, Probe};
+use crate::control::readings::Readings;
 use crate::control::self_test;
 use crate::control::states::Event;
 

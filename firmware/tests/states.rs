@@ -10,7 +10,8 @@
 
 use std::fmt::Write;
 
-use firmware::control::controller::{Config, Controller, Readings};
+use firmware::control::controller::{Config, Controller};
+use firmware::control::readings::Readings;
 use firmware::control::states::{Event, Halt, State, TRANSITIONS};
 use firmware::mechanics::arm::IRB_930;
 use firmware::mechanics::dynamics::drive::Drive;

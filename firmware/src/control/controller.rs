@@ -15,16 +15,16 @@ mod transitions;
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
-    Cause, ControlWord, DriveStatus, Fault, LimitFlags, Mode, MotionReply, MotionRequest, Outcome,
-    Refusal,
+    Cause, ControlWord, Fault, LimitFlags, Mode, MotionReply, MotionRequest, Outcome, Refusal,
 };
 use protocol::time::Period;
 use serde::{Deserialize, Serialize};
 
 use crate::control::laws::{ControlInput, Memory, Model, Motion, Selection, Task};
 use crate::control::limits;
-use crate::control::monitor::{Monitor, Seen};
+use crate::control::monitor::Monitor;
 use crate::control::phase::{Phase, Probe};
+use crate::control::readings::Readings;
 use crate::control::setup::Setup;
 use crate::control::states::State;
 use crate::mechanics::arm::{ArmModel, Axis};
@@ -70,21 +70,6 @@ impl Config {
             setup: Setup::new(period.seconds()),
         }
     }
-}
-
-/// Drive readings of one sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Readings {
-    /// Samples since the last readings: 1, or more where feedback was lost.
-    pub steps: u32,
-    /// State of the drives.
-    pub status: DriveStatus,
-    /// Motor encoder counts.
-    pub counts: [i32; 4],
-    /// Motor velocities, rad/s, means over the last sample.
-    pub velocity: Vector4<f32>,
-    /// Motor torques, N m, means over the last sample.
-    pub torque: Vector4<f32>,
 }
 
 /// What the drives are to do until the next command.
@@ -274,13 +259,7 @@ impl Controller {
         if readings.steps > 1 {
             self.bridge(readings.steps);
         }
-        let seen = Seen {
-            q: &q,
-            qd: &qd,
-            torque: &measured_torque,
-            motor: &readings.velocity,
-        };
-        self.watch(readings, &seen);
+        self.watch(readings, &q, &qd);
         self.wait(readings.steps);
         if !self.state.is_powered() {
             // No torque: follow the arm, so that enabling starts at its present position.
@@ -338,7 +317,8 @@ impl Controller {
         self.excess = limited.excess;
         if limited.flags != LimitFlags::EMPTY {
             self.limits = self.limits | limited.flags;
-            self.strain(&seen);
+            let qd = motion.qd;
+            self.strain(readings, &qd);
         }
         probe.end(Phase::Limits);
         Actions {
@@ -352,10 +332,10 @@ impl Controller {
     /// anywhere.
     // Out of line: rare in a sample.
     #[inline(never)]
-    fn strain(&mut self, seen: &Seen<'_>) {
+    fn strain(&mut self, readings: &Readings, qd: &Vector4<f32>) {
         let slow = self.config.arm.limits.velocity * SLOW;
         let stands =
-            |axis: &Axis| axis.of(&self.excess) != 0.0 && axis.of(seen.qd).abs() < axis.of(&slow);
+            |axis: &Axis| axis.of(&self.excess) != 0.0 && axis.of(qd).abs() < axis.of(&slow);
         let Some(axis) = Axis::ALL.into_iter().find(stands) else {
             return;
         };
@@ -363,7 +343,7 @@ impl Controller {
         let time = self.saturated as f32 * self.config.period.seconds();
         let limit = self.setup.saturation_time;
         if time >= limit {
-            let fault = if seen.is_still(axis) {
+            let fault = if readings.is_still(axis) {
                 Fault::value(Cause::StuckSensor, axis.of(&self.error), 0.0)
             } else {
                 Fault::value(Cause::OverTorque, time * 1e3, limit * 1e3)

@@ -5,10 +5,8 @@ use protocol::messages::{Cause, DriveStatus, Fault, FaultAxis};
 use protocol::parameters::ControllerParameter as Parameter;
 use serde::{Deserialize, Serialize};
 
+use crate::control::readings::Readings;
 use crate::mechanics::arm::{ArmModel, Axis};
-
-/// Speed of a motor up to which its encoder does not move, rad/s: some counts in a sample.
-const STILL: f32 = 0.5;
 
 /// Limits whose violation stops the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,26 +52,6 @@ impl MonitorLimits {
     }
 }
 
-/// What the drives report of the motion in one sample.
-#[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
-    /// Joint positions: rad, rad, m, rad.
-    pub q: &'a Vector4<f32>,
-    /// Joint velocities.
-    pub qd: &'a Vector4<f32>,
-    /// Joint torques and forces of the motors.
-    pub torque: &'a Vector4<f32>,
-    /// Velocities of the motors, rad/s.
-    pub motor: &'a Vector4<f32>,
-}
-
-impl Seen<'_> {
-    /// Whether the encoder of an axis does not move. Asked of the motor: the lift moves with the wrist as well.
-    pub fn is_still(&self, axis: Axis) -> bool {
-        axis.of(self.motor).abs() <= STILL
-    }
-}
-
 /// Monitor of one arm: its limits, prepared for use in every sample, and counts of consecutive violations.
 #[derive(Clone, Copy, Debug)]
 pub struct Monitor {
@@ -88,8 +66,8 @@ pub struct Monitor {
     following_count: u32,
     speed_count: u32,
     range_count: u32,
-    /// Joint speeds when an axis was first found too far from its reference.
-    first_qd: Vector4<f32>,
+    /// Velocities of the motors when an axis was first found too far from its reference, rad/s.
+    velocity: Vector4<f32>,
 }
 
 impl Monitor {
@@ -105,7 +83,7 @@ impl Monitor {
             following_count: 0,
             speed_count: 0,
             range_count: 0,
-            first_qd: Vector4::zeros(),
+            velocity: Vector4::zeros(),
         };
         monitor.adopt(arm, limits);
         monitor
@@ -135,8 +113,13 @@ impl Monitor {
     }
 
     /// Judges one sample; `error` is reference minus measured position.
-    pub fn check(&mut self, seen: &Seen<'_>, error: &Vector4<f32>) -> Option<Fault> {
-        let Seen { q, qd, .. } = *seen;
+    pub fn check(
+        &mut self,
+        readings: &Readings,
+        q: &Vector4<f32>,
+        qd: &Vector4<f32>,
+        error: &Vector4<f32>,
+    ) -> Option<Fault> {
         let following = first_beyond(error, &self.following_error);
         let speed = first_beyond(qd, &self.speed);
         let range = first_beyond(&(q - self.middle), &self.reach);
@@ -144,18 +127,17 @@ impl Monitor {
             self.reset();
             return None;
         }
-        self.trip(seen, error, [following, speed, range])
+        self.trip(readings, [q, qd, error], [following, speed, range])
     }
 
     /// Out of line: rarely reached in a sample.
     #[inline(never)]
     fn trip(
         &mut self,
-        seen: &Seen<'_>,
-        error: &Vector4<f32>,
+        readings: &Readings,
+        [q, qd, error]: [&Vector4<f32>; 3],
         [following, speed, range]: [Option<Axis>; 3],
     ) -> Option<Fault> {
-        let Seen { q, qd, .. } = *seen;
         if self.following_count == 0
             && let Some(axis) = first_beyond(error, &self.jump)
         {
@@ -163,11 +145,11 @@ impl Monitor {
             return Some(of_axis(Cause::EncoderFault, axis, error, &self.jump));
         }
         if self.following_count == 0 {
-            self.first_qd = *qd;
+            self.velocity = readings.velocity;
         }
         let needed = self.needed;
         let following = count(&mut self.following_count, following, needed).map(|axis| {
-            let cause = self.why_not_following(axis, seen, axis.of(error));
+            let cause = self.why_not_following(readings, axis, axis.of(qd) * axis.of(error));
             of_axis(cause, axis, error, &self.following_error)
         });
         let speed = count(&mut self.speed_count, speed, needed)
@@ -182,14 +164,11 @@ impl Monitor {
 
     /// What keeps an axis from following. A stop closes the loop through its encoder; the ways in which a wrong reading shows
     /// therefore have causes of their own, whose reaction does without that loop. A blocked axis looks like a stuck encoder,
-    /// and needs no stop either.
-    fn why_not_following(&self, axis: Axis, seen: &Seen<'_>, error: f32) -> Cause {
-        let [qd, torque] = [seen.qd, seen.torque].map(|of| axis.of(of));
-        let leaves = qd * error < 0.0 && qd.abs() > axis.of(&self.first_qd).abs();
-        if seen.is_still(axis) {
+    /// and needs no stop either. `approach` is below 0 for an axis that moves away from its reference.
+    fn why_not_following(&self, readings: &Readings, axis: Axis, approach: f32) -> Cause {
+        if readings.is_still(axis) {
             Cause::StuckSensor
-        } else if leaves && torque * error > 0.0 {
-            // Faster and faster, against its torque.
+        } else if approach < 0.0 && readings.defies_torque(axis, axis.of(&self.velocity)) {
             Cause::EncoderFault
         } else {
             Cause::FollowingError

@@ -1,11 +1,13 @@
 //! Entry actions of the states, and the events that change them.
 
+use nalgebra::Vector4;
 use protocol::messages::{Cause, ControlWord, Fault, LimitFlags};
 
-use super::{Controller, Readings};
+use super::Controller;
 use crate::control::fault;
 use crate::control::laws::Memory;
-use crate::control::monitor::{Monitor, Seen};
+use crate::control::monitor::Monitor;
+use crate::control::readings::Readings;
 use crate::control::states::{Event, Halt, State};
 
 impl Controller {
@@ -70,7 +72,7 @@ impl Controller {
     }
 
     /// Watches the arm as long as torque moves or holds it, including a stop for a fault.
-    pub(super) fn watch(&mut self, readings: &Readings, seen: &Seen<'_>) {
+    pub(super) fn watch(&mut self, readings: &Readings, q: &Vector4<f32>, qd: &Vector4<f32>) {
         if !self.state.is_powered() {
             return;
         }
@@ -80,10 +82,10 @@ impl Controller {
         if let Some(fault) = Monitor::status(readings.status, has_torque) {
             self.fail(fault);
         }
-        let error = self.setpoint.reference.q - seen.q;
+        let error = self.setpoint.reference.q - q;
         // The reference of the last sample: at most one sample of motion older than `q`.
         let moved = self.setpoint.reference.qd * self.config.period.seconds();
-        if let Some(fault) = self.monitor.check(seen, &(error + moved)) {
+        if let Some(fault) = self.monitor.check(readings, q, qd, &(error + moved)) {
             self.fail(fault);
         }
     }
