@@ -78,6 +78,9 @@ impl Plant {
     /// steep friction gets shorter steps.
     pub const MAX_STEP_NS: u64 = 750_000;
 
+    /// Shortest step that a robot may make necessary, ns.
+    pub const MIN_STEP_NS: u64 = 10_000;
+
     /// Longest step while the brake slides, ns.
     const BRAKING_STEP_NS: u64 = 250_000;
 
@@ -95,7 +98,8 @@ impl Plant {
                 &stretched,
                 &drive.friction_secant(&Vector4::zeros()),
             )
-            .clamp(10_000, Self::MAX_STEP_NS),
+            .min(stop::resolvable_step(model))
+            .clamp(Self::MIN_STEP_NS, Self::MAX_STEP_NS),
             drive,
             brake: Brake::new(model.limits.effort[LIFT]),
             model: model.clone(),

@@ -6,7 +6,8 @@
 
 use std::collections::VecDeque;
 
-use firmware::control::controller::{Config, Controller, Readings};
+use firmware::control::controller::{Config, Controller};
+use firmware::control::readings::Readings;
 use firmware::control::states::Event;
 use firmware::mechanics::arm::ArmModel;
 use firmware::mechanics::body::Body;

@@ -8,8 +8,10 @@ use protocol::wire::BitTiming;
 use crate::bus::Overload;
 use crate::maths::hypot;
 use crate::model::{JointLimits, RobotModel};
+use crate::plant::Plant;
 use crate::plant::arm::Arm;
 use crate::plant::kinematics::{Pose, Unreachable, Violation, inverse};
+use crate::plant::stop::resolvable_step;
 use crate::rig::{self, RigConfig};
 use crate::scenario::{Elbow, Scenario, ScenarioError, Step};
 use crate::text::lines;
@@ -59,6 +61,18 @@ pub enum SetupError {
         /// Reason.
         source: arm::ModelError,
     },
+    /// The simulation cannot resolve the robot on its end stops.
+    #[error(
+        "model {robot}: a joint on its end stop needs steps of {step_us} us, below the shortest, {} us: a centre of mass is too \
+         far out, or a link too heavy, beside the inertia of the others",
+        Plant::MIN_STEP_NS / 1000
+    )]
+    Stiff {
+        /// Robot.
+        robot: String,
+        /// Step that it needs, us.
+        step_us: f64,
+    },
     /// The bus cannot carry the messages at this rate.
     #[error("at {rate_hz} Hz the {source}; lower the rate")]
     Link {
@@ -106,6 +120,13 @@ impl RunConfig {
             robot: self.nominal.name.clone(),
             source,
         }));
+        let step = resolvable_step(&actual);
+        if step < Plant::MIN_STEP_NS {
+            wrong.push(SetupError::Stiff {
+                robot: actual.name.clone(),
+                step_us: step as f64 * 1e-3,
+            });
+        }
         let load = rig::admit(&timing, scenario.rate_hz);
         wrong.extend(load.err().map(|source| SetupError::Link {
             rate_hz: scenario.rate_hz,

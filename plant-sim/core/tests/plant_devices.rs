@@ -11,10 +11,10 @@
 use nalgebra::Vector4;
 use proptest::prelude::*;
 use sim::model::{Payload, RobotModel};
-use sim::plant::Plant;
 use sim::plant::arm::Arm;
 use sim::plant::brake::Brake;
 use sim::plant::encoder::Encoder;
+use sim::plant::{Energy, Plant, stop};
 use std::f64::consts::TAU;
 
 const MS: u64 = 1_000_000;
@@ -157,6 +157,35 @@ fn an_end_stop_throws_back_three_tenths_of_the_speed() {
         "{:?}",
         plant.qd()
     );
+}
+
+/// With its mass far out, beside a first link that is light, the arm meets its stops with a thirtieth of its inertia.
+#[test]
+fn end_stops_hold_an_arm_whose_mass_is_far_out() {
+    let mut model = RobotModel::irb_930_22_105();
+    model.links[0].mass = 2.0;
+    model.links[1].com[0] = 5.2;
+    assert!((10_000..Plant::MAX_STEP_NS).contains(&stop::resolvable_step(&model)));
+    let torque = model.drive.motor_torque_limit;
+    for [shoulder, elbow] in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+        let mut plant = released(&model, START);
+        plant.set_motor_torque([shoulder * torque[0], elbow * torque[1], 0.0, 0.0]);
+        let (mut balance, mut most) = (0.0_f64, 0.0_f64);
+        let of = |e: Energy| e.kinetic + e.potential + e.elastic + e.lost - e.motor_work;
+        let begin = of(plant.energy());
+        for _ in 0..6_000 {
+            run(&mut plant, MS);
+            for (axis, q) in plant.q().into_iter().enumerate() {
+                let beyond = (q - model.limits.upper[axis]).max(model.limits.lower[axis] - q);
+                // NaN is not below.
+                assert!(beyond < 0.1, "axis {axis} is {beyond} beyond its limit");
+            }
+            most = most.max(plant.energy().kinetic);
+            balance = balance.max((of(plant.energy()) - begin).abs());
+        }
+        // A step of one time constant of the damper has an error of 1/24 of its loss.
+        assert!(balance < 0.1 * most, "{balance} of {most} J");
+    }
 }
 
 #[test]

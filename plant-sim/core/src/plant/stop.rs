@@ -1,8 +1,14 @@
 //! End stops: a one-sided spring with a damper at each joint limit.
 
+use std::f64::consts::TAU;
+
 use crate::maths::square;
-use crate::model::JointLimits;
+use crate::model::{JointLimits, RobotModel};
 use nalgebra::Vector4;
+
+use super::arm::Arm;
+use super::drive::Drive;
+use super::factor::Factor;
 
 /// The eight end stops.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +25,30 @@ const RATE: f64 = 400.0;
 
 /// Damping ratio on the stop: an axis leaves it with three tenths of its arrival speed.
 const DAMPING_RATIO: f64 = 0.5;
+
+/// Longest step (ns) that resolves every joint of a robot on its end stops. A short one takes masses that are far out on
+/// links that are light themselves.
+///
+/// A joint whose neighbours may give way meets its stop with the inertia `1 / (M^-1)_ii`, below that of the stretched arm by
+/// a factor r. There its motion decays with `2 D r RATE` 1/s at most, and two time constants of it are the limit of an
+/// explicit method: a step takes one.
+pub fn resolvable_step(model: &RobotModel) -> u64 {
+    /// Angles of the elbow, on which alone the mass matrix depends.
+    const ANGLES: u32 = 64;
+    let (arm, drive) = (Arm::new(model, None), Drive::new(&model.drive));
+    let mass = |elbow: f64| {
+        arm.mass_matrix(&arm.at(&Vector4::new(0.0, elbow, 0.0, 0.0))) + drive.rotor_inertia()
+    };
+    let stretched = mass(0.0).diagonal();
+    let mut ratio = 1.0f64;
+    for k in 0..ANGLES {
+        let factor = Factor::of(&mass(TAU * f64::from(k) / f64::from(ANGLES)));
+        for i in 0..4 {
+            ratio = ratio.max(stretched[i] * factor.solve(&Vector4::ith(i, 1.0))[i]);
+        }
+    }
+    (1e9 / (2.0 * DAMPING_RATIO * RATE * ratio)) as u64
+}
 
 impl EndStops {
     /// Stops at the limits, for joints of these inertias (kg m2, kg).
