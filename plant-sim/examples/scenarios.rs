@@ -12,7 +12,7 @@ use sim::scenario::{Scenario, names};
 
 fn main() {
     println!("| name | what it is for | requirements |\n|---|---|---|");
-    for name in names().split(", ") {
+    for name in names() {
         let scenario = Scenario::built_in(name).expect("it comes with the program");
         let about = scenario.about.unwrap_or_default();
         let all = scenario.requirements.iter();

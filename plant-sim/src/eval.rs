@@ -20,9 +20,9 @@ use thiserror::Error;
 /// What to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Table {
-    /// Flange pose, Jacobian, twist and Jdot qd of q, qd
+    /// Flange pose, Jacobian, twist and Jdot qd of q (rad, rad, m, rad), qd
     Kinematics,
-    /// Both joint solutions of x, y, z, yaw
+    /// Both joint solutions of x, y, z (m), yaw (rad)
     Ik,
     /// Efforts, mass matrix, Coriolis and gravity of q, qd, qdd
     Dynamics,

@@ -12,14 +12,17 @@ pub enum InputError {
     /// Neither a built-in scenario nor a file.
     #[error(
         "no scenario '{name}': neither a file nor one of {}",
-        scenario::names()
+        scenario::instead_of(name)
     )]
     NoScenario {
         /// The requested name.
         name: String,
     },
     /// Neither a built-in robot nor a file.
-    #[error("no robot '{name}': neither a file nor one of {}", model::names())]
+    #[error(
+        "no robot '{name}': neither a file nor one of {}",
+        model::instead_of(name)
+    )]
     NoRobot {
         /// What was asked for.
         name: String,

@@ -211,15 +211,30 @@ fn the_page_has_these_codes_and_no_others() {
 }
 
 #[test]
+fn a_name_that_is_nearly_right_is_recognised() {
+    for (args, meant) in [
+        (["run", "gaet"], "gate"),
+        (["check", "palletize"], "palletise"),
+        (["--model", "irb930-12-0.8"], "irb930-12-0.85"),
+        (["--law", "computed-torq"], "computed-torque"),
+    ] {
+        let output = plant_sim(&args);
+        assert_eq!(output.status.code(), Some(2), "{args:?}");
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(error.contains(&format!("did you mean {meant}?")), "{error}");
+    }
+}
+
+#[test]
 fn what_is_built_in_is_named_in_help_and_refusals() {
     let help = String::from_utf8(plant_sim(&["run", "--help"]).stdout).unwrap();
     let words: Vec<&str> = help.split_whitespace().collect();
     let help = words.join(" ");
     let refused = String::from_utf8(plant_sim(&["run", "--model", "none"]).stderr).unwrap();
-    for name in sim::model::names().split(", ") {
+    for name in sim::model::names() {
         assert!(help.contains(name) && refused.contains(name), "{name}");
     }
-    for name in sim::scenario::names().split(", ") {
+    for name in sim::scenario::names() {
         assert!(help.contains(name), "{name}");
     }
 }

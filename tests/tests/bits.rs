@@ -36,7 +36,7 @@ fn every_scenario_and_every_law_has_a_row() {
         .collect();
     let names = scenario::names();
     let mut expected: BTreeSet<(String, String)> = names
-        .split(", ")
+        .into_iter()
         .map(|name| {
             let law = Scenario::built_in(name).unwrap().law;
             (name.into(), law.to_string())

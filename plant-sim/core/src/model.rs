@@ -11,7 +11,7 @@ mod read;
 use protocol::messages::FaultAxis;
 use thiserror::Error;
 
-use crate::text::Source;
+use crate::text::{Source, allowed};
 
 /// Names of the joints, in order.
 pub const AXES: [&str; 4] = [
@@ -205,8 +205,13 @@ impl PartialEq for RobotModel {
 }
 
 /// Names of the robots that come with the program.
-pub fn names() -> String {
-    BUILT_IN.map(|(name, _)| name).join(", ")
+pub fn names() -> [&'static str; BUILT_IN.len()] {
+    BUILT_IN.map(|(name, _)| name)
+}
+
+/// Those names, for a message that none is called `name`, and the one most likely meant.
+pub fn instead_of(name: &str) -> String {
+    allowed(name, &names())
 }
 
 impl RobotModel {

@@ -21,7 +21,7 @@ use crate::selection::LawChoice;
 pub use change::Change;
 use error::for_people;
 pub use error::{Place, ScenarioError};
-pub use library::{built_in, names};
+pub use library::{built_in, instead_of, names};
 pub(crate) use requirement::Measured;
 pub use requirement::{Axis, Ending, Quantity, Requirement, StateName};
 

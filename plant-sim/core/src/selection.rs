@@ -8,6 +8,8 @@ use protocol::messages::{Compensation, Law};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize, Serializer};
 
+use crate::text::allowed;
+
 /// A control law and its compensation of friction and payload error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
@@ -22,22 +24,18 @@ pub struct LawChoice {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LawError {
     /// No such law.
-    #[error("no control law '{0}'; allowed: {list}", list = names())]
+    #[error("no control law '{0}'; allowed: {list}", list = allowed(.0, &names()))]
     Law(String),
     /// No such compensation.
-    #[error("no compensation '{0}'; allowed: none, integral, observer")]
+    #[error("no compensation '{0}'; allowed: {list}", list = allowed(.0, &["none", "integral", "observer"]))]
     Compensation(String),
     /// A compensation for a law that takes none.
     #[error("{0} takes no compensation; only computed-torque and computed-torque-task do")]
     NotTaken(Law),
 }
 
-fn names() -> String {
-    Law::CODES
-        .iter()
-        .map(|(_, name)| *name)
-        .collect::<Vec<_>>()
-        .join(", ")
+fn names() -> Vec<&'static str> {
+    Law::CODES.iter().map(|(_, name)| *name).collect()
 }
 
 impl FromStr for LawChoice {

@@ -26,6 +26,15 @@ pub(crate) fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> O
         .map(|(_, known)| known)
 }
 
+/// Words that are allowed where `word` is not, and the one most likely meant.
+pub(crate) fn allowed(word: &str, known: &[&str]) -> String {
+    let list = known.join(", ");
+    match nearest(word, known.iter().copied()) {
+        Some(near) => format!("{list}; did you mean {near}?"),
+        None => list,
+    }
+}
+
 /// Several messages, one on a line.
 pub(crate) fn lines(messages: &[impl ToString]) -> String {
     let lines: Vec<String> = messages.iter().map(ToString::to_string).collect();

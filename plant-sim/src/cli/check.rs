@@ -12,8 +12,11 @@ use super::{Failure, show};
 /// Arguments of `check`.
 #[derive(Args)]
 pub(super) struct CheckArgs {
-    #[arg(value_name = "SCENARIO", default_value = "gate", help = what("check"))]
-    scenario: String,
+    #[arg(value_name = "NAME|FILE", default_value = "gate", help = what("check"))]
+    name: String,
+    /// The same, written as for run.
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "name")]
+    scenario: Option<String>,
     #[command(flatten)]
     config: ConfigArgs,
     /// Print JSON instead of text.
@@ -23,7 +26,8 @@ pub(super) struct CheckArgs {
 
 /// Plans the scenario and shows durations and torques. Fails where the controller would refuse a step.
 pub(super) fn run(args: &CheckArgs) -> Result<(), Failure> {
-    let config = args.config.config(&args.scenario)?;
+    let scenario = args.scenario.as_ref().unwrap_or(&args.name);
+    let config = args.config.config(scenario)?;
     let plan = rehearse(&config).map_err(|error| match error {
         RehearsalError::Setup(error) => Failure::usage(error),
         RehearsalError::Operator(errors) => {

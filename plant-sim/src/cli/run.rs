@@ -27,7 +27,7 @@ pub(super) use config::{ConfigArgs, load, what};
 use place::{Place, PlaceArgs};
 use verdicts::VerdictArgs;
 
-/// Arguments of `run`.
+/// What to run, and where the results go.
 #[derive(Args, Clone)]
 pub(super) struct RunArgs {
     #[arg(long, value_name = "NAME|FILE", default_value = "gate", help = config::what("run"))]
@@ -54,6 +54,25 @@ pub(super) struct RunArgs {
     json: bool,
     #[command(flatten)]
     verdicts: VerdictArgs,
+}
+
+/// Arguments of `run`, where the scenario may stand alone; without the command it could not be told from one.
+#[derive(Args)]
+pub(super) struct NamedRunArgs {
+    /// The same as --scenario.
+    #[arg(value_name = "NAME|FILE", conflicts_with = "scenario")]
+    name: Option<String>,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+impl From<NamedRunArgs> for RunArgs {
+    fn from(NamedRunArgs { name, run }: NamedRunArgs) -> Self {
+        match name {
+            Some(scenario) => Self { scenario, ..run },
+            None => run,
+        }
+    }
 }
 
 /// Runs the scenario, writes the results and shows the summary.

@@ -7,7 +7,7 @@ use protocol::time::Instant;
 use super::{Fault, FrameFault, What, duration};
 use crate::model::AXES;
 use crate::plant::defect::{EncoderDefect, MotorDefect};
-use crate::text::nearest;
+use crate::text::allowed;
 
 /// Why a text does not describe a fault: what is wrong and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -265,10 +265,8 @@ fn places() -> Vec<&'static str> {
 }
 
 fn unknown(what: &str, word: &str, known: Vec<&str>) -> String {
-    let near = nearest(word, known.iter().copied())
-        .map_or_else(String::new, |near| format!("; did you mean {near}?"));
     format!(
-        "there is no {what} {word:?}; allowed: {}{near}",
-        known.join(", ")
+        "there is no {what} {word:?}; allowed: {}",
+        allowed(word, &known)
     )
 }

@@ -1,5 +1,7 @@
 //! Scenarios that come with the program.
 
+use crate::text::allowed;
+
 macro_rules! built_in {
     ($($name:literal),+) => {
         [$(($name, include_str!(concat!("../../../scenarios/", $name, ".toml")))),+]
@@ -32,8 +34,13 @@ pub fn built_in(name: &str) -> Option<&'static str> {
 }
 
 /// Names of the scenarios that come with the program.
-pub fn names() -> String {
-    BUILT_IN.map(|(name, _)| name).join(", ")
+pub fn names() -> [&'static str; BUILT_IN.len()] {
+    BUILT_IN.map(|(name, _)| name)
+}
+
+/// Those names, for a message that none is called `name`, and the one most likely meant.
+pub fn instead_of(name: &str) -> String {
+    allowed(name, &names())
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use crate::cli::values::{number, whole};
 pub(crate) fn what(act: &str) -> String {
     format!(
         "What to {act}: a scenario file, or one that comes with the program: {}",
-        scenario::names()
+        scenario::names().join(", ")
     )
 }
 

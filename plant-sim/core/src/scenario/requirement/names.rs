@@ -7,7 +7,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::model::AXES;
-use crate::text::nearest;
+use crate::text::allowed;
 
 /// An axis, by its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
@@ -57,11 +57,9 @@ fn states() -> Vec<&'static str> {
 }
 
 fn unknown(what: &str, name: &str, known: &[&str]) -> String {
-    let near = nearest(name, known.iter().copied())
-        .map_or_else(String::new, |near| format!("; did you mean {near}?"));
     format!(
-        "there is no {what} {name:?}; allowed: {}{near}",
-        known.join(", ")
+        "there is no {what} {name:?}; allowed: {}",
+        allowed(name, known)
     )
 }
 
