@@ -213,6 +213,23 @@ fn the_gate_fills_the_torque_of_three_axes() {
     );
 }
 
+/// 150 degrees are written as 2.617994 rad, which is 0.1 urad beyond the limit.
+#[test]
+fn a_joint_target_on_a_limit_may_be_rounded() {
+    let home = Vector4::new(0.0, 1.5, 0.15, 0.0);
+    let limits = &IRB_930.limits;
+    for limit in [limits.lower, limits.upper] {
+        let rounded = limit
+            .map(|q| ((f64::from(q) * 1e6 + 0.5 * f64::from(q.signum())) as i64) as f32 * 1e-6);
+        let trajectory = plan(&IRB_930, &two_kg(), &home, Target::Joints(rounded), 1.0).unwrap();
+        let end = trajectory.at(&IRB_930, trajectory.duration()).unwrap();
+        // From `home` by a rounded difference.
+        assert!((end.q - limit).amax() < 1e-6, "{}", end.q);
+        let beyond = limit + limit.map(|q| 1e-4 * if q < 1.0 { -1.0 } else { 1.0 });
+        assert!(plan(&IRB_930, &two_kg(), &home, Target::Joints(beyond), 1.0).is_err());
+    }
+}
+
 #[test]
 fn refusals_name_axis_value_and_limit() {
     let home = Vector4::new(0.0, 1.5, 0.15, 0.0);

@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector3, Vector4};
 use crate::mechanics::arm::Geometry;
 use crate::mechanics::math::{sin_cos, wrap};
 
-pub(crate) use ik::check_range;
 pub use ik::{Elbow, IkError, LIMIT_TOLERANCE, REACH_TOLERANCE, Wrist, inverse, locate, solve};
+pub(crate) use ik::{check_range, within_limits};
 
 /// Sines and cosines of one joint position, computed once per tick and shared by everything that needs them.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -110,20 +110,14 @@ impl Path {
     }
 }
 
-/// First joint limit that `q` violates. On the way `from` a place past a limit, as an arm that stands on one is by half an
-/// encoder count, no further past it than there.
+/// First joint limit that `q` violates on the way `from` a place; from one past a limit, as an arm that stands on one is by
+/// half an encoder count, no further past it than there.
 ///
 /// # Errors
 /// [`IkError::Limit`] with the axis, the value and the limit passed.
 // Out of line: asked for at every point of a path.
 #[inline(never)]
-pub fn check_limits(
-    arm: &ArmModel,
-    q: &Vector4<f32>,
-    from: Option<&Vector4<f32>>,
-) -> Result<(), IkError> {
+pub fn check_limits(arm: &ArmModel, q: &Vector4<f32>, from: &Vector4<f32>) -> Result<(), IkError> {
     let limits = &arm.limits;
-    let lower = from.map_or(limits.lower, |from| limits.lower.inf(from));
-    let upper = from.map_or(limits.upper, |from| limits.upper.sup(from));
-    kinematics::check_range(q, &lower, &upper, limits)
+    kinematics::check_range(q, &limits.lower.inf(from), &limits.upper.sup(from), limits)
 }

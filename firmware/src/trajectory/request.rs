@@ -3,7 +3,7 @@
 use nalgebra::Vector4;
 use protocol::messages::{ElbowSide, Posture, Refusal, RefusalReason, WristTurn};
 
-use super::path::{MIN_SIN_ELBOW, Path, PathError, check_limits};
+use super::path::{MIN_SIN_ELBOW, Path, PathError};
 use crate::mechanics::arm::{ArmModel, Axis};
 use crate::mechanics::kinematics::{self, Elbow, IkError, Pose, Wrist};
 use crate::mechanics::math::wrap;
@@ -62,7 +62,7 @@ impl Target {
     /// A target that is not finite, out of reach or outside a limit.
     pub(super) fn end(&self, arm: &ArmModel, from: &Vector4<f32>) -> Result<Vector4<f32>, Refusal> {
         match self {
-            Self::Joints(q) => check_limits(arm, q, None).map_err(from_ik).map(|()| *q),
+            Self::Joints(q) => kinematics::within_limits(q, &arm.limits).map_err(from_ik),
             Self::Line(pose, posture) | Self::Jump { pose, posture, .. } => {
                 joints_of(arm, pose, *posture, from)
             }

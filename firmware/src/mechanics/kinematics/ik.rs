@@ -208,7 +208,10 @@ fn nearest_turn(angle: f32, near: f32, lower: f32, upper: f32) -> f32 {
 ///
 /// # Errors
 /// [`IkError::NotFinite`], and [`IkError::Limit`] for the first axis that exceeds a limit by more than [`LIMIT_TOLERANCE`].
-fn within_limits(q: &Vector4<f32>, limits: &JointLimits) -> Result<Vector4<f32>, IkError> {
+pub(crate) fn within_limits(
+    q: &Vector4<f32>,
+    limits: &JointLimits,
+) -> Result<Vector4<f32>, IkError> {
     let slack = (limits.upper - limits.lower) * LIMIT_TOLERANCE;
     check_range(q, &(limits.lower - slack), &(limits.upper + slack), limits)?;
     Ok(q.zip_zip_map(&limits.lower, &limits.upper, clamp))

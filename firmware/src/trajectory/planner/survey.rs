@@ -35,7 +35,7 @@ impl Planner {
         let here = self.point(budget.arm, s)?;
         // Until the plan is complete, this is where it starts.
         let from = &self.draft.end;
-        check_limits(budget.arm, &here.q, Some(from)).map_err(from_ik)?;
+        check_limits(budget.arm, &here.q, from).map_err(from_ik)?;
         let limits = &budget.arm.limits;
         let fastest = fastest.sup(&here.dq.abs());
         if point == 0 {
