@@ -9,6 +9,7 @@
 //! campaign               many runs with faults: plans, shards, results
 //! crash                  planted faults of the board, and how they end
 //! check, replay, plot    a trace judged, repeated and drawn
+//! mcap                   a trace or a run as MCAP, for Foxglove and Lichtblick
 //! play, record, monitor  a trace sent to a bus, a bus recorded, and a bus watched
 //! report                 the pages about runs (sources in pages)
 //! verdicts               what became of requirements: in words, JUnit XML, needs.json and Markdown
@@ -45,6 +46,7 @@ pub mod eval;
 pub mod external;
 pub mod input;
 pub mod interrupt;
+pub mod mcap;
 pub mod monitor;
 pub mod output;
 pub mod parameters;

@@ -17,7 +17,7 @@ kib() { # kib FRAMES COMMAND...: peak resident memory of the command that reads 
     [ "$1" != stats ] || grep -q "^$frames frames" "$out" || fail "not $frames frames"
     cat "$work/kib"
 }
-for command in stats decode "decode --format csv" "decode --format jsonl" "convert --to pcapng" "convert --to asc" plot; do
+for command in stats decode "decode --format csv" "decode --format jsonl" "convert --to pcapng" "convert --to asc" "convert --to mcap" plot; do
     short=$(kib $((long / 10)) $command)
     full=$(kib "$long" $command)
     # Keeping four bytes per frame would take 2.4 MiB more.

@@ -47,7 +47,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Run a scenario (the default command).
-    Run(run::NamedRunArgs),
+    Run(Box<run::NamedRunArgs>),
     /// Check a scenario without running it: what would be refused, how long it takes, what torque it needs.
     Check(check::CheckArgs),
     /// Run many cases with a fault each, on one machine or on a cluster, and judge them.
@@ -99,7 +99,7 @@ pub(crate) fn main() -> u8 {
 fn command(cli: Cli) -> Result<(), Failure> {
     match cli.command {
         None => run::run(&cli.run),
-        Some(Command::Run(args)) => run::run(&args.into()),
+        Some(Command::Run(args)) => run::run(&(*args).into()),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::Campaign(command)) => campaign::run(&command),
         Some(Command::Cost(args)) => cost::run(&args),

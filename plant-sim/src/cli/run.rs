@@ -1,6 +1,7 @@
 //! `plant-sim run`: a scenario from start to summary.
 
 mod config;
+mod mcap;
 mod place;
 mod text;
 mod verdicts;
@@ -24,6 +25,7 @@ use sim::setup::RunConfig;
 
 use super::{Failure, show};
 pub(super) use config::{ConfigArgs, load, what};
+use mcap::McapFile;
 use place::{Place, PlaceArgs};
 use verdicts::VerdictArgs;
 
@@ -54,6 +56,10 @@ pub(super) struct RunArgs {
     json: bool,
     #[command(flatten)]
     verdicts: VerdictArgs,
+    /// Write the run to this file as MCAP, for Foxglove and Lichtblick: every frame, joint states (measured, actual, reference)
+    /// and the arm in motion.
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
 }
 
 /// Arguments of `run`, where the scenario may stand alone; without the command it could not be told from one.
@@ -82,6 +88,10 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     // Everything that can be refused is, before the folder is touched.
     config.rig().map_err(Failure::usage)?;
     let verdicts = args.verdicts.create()?;
+    let mcap = args.mcap.as_deref();
+    let mut mcap = mcap
+        .map(|path| McapFile::create(path, &config))
+        .transpose()?;
     let folder = run::folder(&args.out)?;
     let recording = Recording {
         folder: &folder,
@@ -89,7 +99,7 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
         progress: !args.quiet,
     };
     let mut curves = (!args.no_report).then(|| Curves::new(&config));
-    let seen = &mut curves;
+    let seen = (&mut curves, &mut mcap);
     interrupt::listen()?;
     let results = match place {
         Place::InProcess => {
@@ -158,6 +168,9 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
         show(&results.to_json())?;
     } else if !args.quiet {
         show(&text::report(&results, &config, &args.out))?;
+    }
+    if let Some(mcap) = mcap {
+        mcap.finish()?;
     }
     verdicts.write(&results)?;
     failure(&results.summary).map_or(Ok(()), |why| Err(Failure::failed(why)))

@@ -12,6 +12,7 @@ use std::io::{self, Write};
 use clap::Subcommand;
 use firmware::mechanics::arm::ArmModel;
 use plant_sim::interrupt;
+use plant_sim::mcap::Recorder;
 use plant_sim::plot::{Plot, page};
 use trace::convert::Converter;
 use trace::decode::{Decoder, Format};
@@ -20,7 +21,9 @@ use trace::{Interface, Record};
 
 use super::run::load;
 use super::{Failure, show};
-use args::{CheckArgs, ConvertArgs, DecodeArgs, FormatChoice, PlotArgs, ReplayArgs, StatsArgs};
+use args::{
+    CheckArgs, ConvertArgs, DecodeArgs, Form, FormatChoice, PlotArgs, ReplayArgs, StatsArgs,
+};
 use sink::{Records, each, refuse_same, written};
 use source::Source;
 
@@ -71,14 +74,22 @@ fn decode(args: &DecodeArgs) -> Result<(), Failure> {
 }
 
 fn convert(args: &ConvertArgs) -> Result<(), Failure> {
-    let (target, end) = args.goals().map_err(Failure::usage)?;
+    let (form, end) = args.goals().map_err(Failure::usage)?;
+    let model = load(args.model.as_deref())?;
     refuse_same(&args.input.file, args.out.as_deref())?;
     interrupt::listen()?;
     let mut source = Source::open(&args.input.file, args.input.selection(end))?;
-    written(args.out.as_deref(), |sink| {
-        let mut converter = Converter::new(sink, target)?;
-        each(&mut source, &mut converter)?;
-        converter.finish().map(|_| ())
+    written(args.out.as_deref(), |sink| match form {
+        Form::Frames(target) => {
+            let mut converter = Converter::new(sink, target)?;
+            each(&mut source, &mut converter)?;
+            converter.finish().map(|_| ())
+        }
+        Form::Mcap => {
+            let mut recorder = Recorder::new(sink, &model)?;
+            each(&mut source, &mut recorder)?;
+            recorder.finish().map(|_| ())
+        }
     })?;
     source.verdict()
 }
@@ -100,6 +111,17 @@ impl<W: Write> Records for Converter<W> {
 
     fn flush(&mut self) -> io::Result<()> {
         Converter::flush(self)
+    }
+}
+
+impl<W: Write> Records for Recorder<W> {
+    fn record(&mut self, record: &Record) -> io::Result<()> {
+        Recorder::record(self, record)
+    }
+
+    /// Nobody reads this format before its end, and where its parts end must not depend on when the input came.
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 

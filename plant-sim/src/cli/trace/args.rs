@@ -201,47 +201,63 @@ fn speed(text: &str) -> Result<f64, String> {
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     pub input: InputArgs,
-    /// Target format: pcapng (Wireshark, tshark), asc (CANalyzer, CANoe) or candump (can-utils, python-can); and, as a
-    /// number, only up to this time.
+    /// Target format: pcapng (Wireshark, tshark), asc (CANalyzer, CANoe), candump (can-utils, python-can) or mcap
+    /// (Foxglove, Lichtblick); and, as a number, only up to this time.
     #[arg(long, value_name = "FORMAT|S", required = true, value_parser = goal)]
     to: Vec<Goal>,
+    /// The robot (a name or a model file, as for run); for mcap, which has joint positions beside the frames.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub model: Option<String>,
     /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
 
+/// A format to convert to.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Form {
+    /// Of frames alone.
+    Frames(Target),
+    /// Frames, and what they say of the arm.
+    Mcap,
+}
+
 /// A value of `convert --to`.
 #[derive(Clone, Copy)]
 enum Goal {
-    Format(Target),
+    Format(Form),
     End(Moment),
 }
 
 fn goal(text: &str) -> Result<Goal, String> {
     match text {
-        "pcapng" => Ok(Goal::Format(Target::Pcapng)),
-        "asc" => Ok(Goal::Format(Target::Asc)),
-        "candump" => Ok(Goal::Format(Target::Candump)),
+        "pcapng" => Ok(Goal::Format(Form::Frames(Target::Pcapng))),
+        "asc" => Ok(Goal::Format(Form::Frames(Target::Asc))),
+        "candump" => Ok(Goal::Format(Form::Frames(Target::Candump))),
+        "mcap" => Ok(Goal::Format(Form::Mcap)),
         _ => text.parse().map(Goal::End).map_err(|error| {
-            format!("allowed: a format (pcapng, asc, candump) or a time; for a time: {error}")
+            format!("allowed: a format (pcapng, asc, candump, mcap) or a time; for a time: {error}")
         }),
     }
 }
 
 impl ConvertArgs {
     /// The one format, and the end if there is one.
-    pub(crate) fn goals(&self) -> Result<(Target, Option<Moment>), String> {
+    pub(crate) fn goals(&self) -> Result<(Form, Option<Moment>), String> {
         let (mut formats, mut ends) = (Vec::new(), Vec::new());
         for goal in &self.to {
             match goal {
-                Goal::Format(target) => formats.push(*target),
+                Goal::Format(form) => formats.push(*form),
                 Goal::End(moment) => ends.push(*moment),
             }
         }
         match (formats.as_slice(), ends.as_slice()) {
-            ([target], []) => Ok((*target, None)),
-            ([target], [end]) => Ok((*target, Some(*end))),
-            ([], _) => Err("--to has no format; allowed: pcapng, asc, candump".into()),
+            ([Form::Frames(_)], _) if self.model.is_some() => {
+                Err("--model is for --to mcap; the other formats have no joint positions".into())
+            }
+            ([form], []) => Ok((*form, None)),
+            ([form], [end]) => Ok((*form, Some(*end))),
+            ([], _) => Err("--to has no format; allowed: pcapng, asc, candump, mcap".into()),
             _ => Err("--to has more than one format or more than one time".into()),
         }
     }
