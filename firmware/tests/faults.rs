@@ -78,7 +78,9 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::OverTorque => "a torque cut to its limit while the axis hardly moves",
         Cause::SoftLimit => "position against range",
         Cause::EStop => "emergency stop on the bus",
-        Cause::DriveFault => "status of the drives: a fault, or torque off by themselves",
+        Cause::DriveFault => {
+            "status of the drives: a fault, torque off by themselves, a brake that does not close"
+        }
         Cause::EncoderFault => {
             "status of the drives; a jump no axis can make; away from the reference, faster and faster, against the torque"
         }

@@ -260,7 +260,7 @@ impl Controller {
             self.bridge(readings.steps);
         }
         self.watch(readings, &q, &qd);
-        self.wait(readings.steps);
+        self.wait(readings);
         if !self.state.is_powered() {
             // No torque: follow the arm, so that enabling starts at its present position.
             self.setpoint = Setpoint::rest(q);

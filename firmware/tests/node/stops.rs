@@ -2,7 +2,9 @@
 
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
-use protocol::messages::{Cause, ControlWord, DriveStatus, FaultAxis, MotionRequest};
+use protocol::messages::{
+    Cause, ControlWord, DriveStatus, FaultAxis, Mode, MotionRequest, Outcome,
+};
 
 use crate::bench::{Bench, PERIOD, estop, is_off};
 use crate::faults::states;
@@ -81,6 +83,31 @@ fn a_fault_while_stopping_goes_straight_to_the_brake() {
             Cause::EStop,
             "the first cause stays"
         );
+    }
+}
+
+/// A brake that stays open does not hold the lift: torque does, for as long as it takes.
+#[test]
+fn torque_holds_the_lift_until_the_brake_has_closed() {
+    let switched_off = |bench: &mut Bench| {
+        assert_eq!(
+            bench.request(MotionRequest::Disable),
+            Some(Outcome::Accepted)
+        );
+    };
+    let drive_fault = |bench: &mut Bench| {
+        bench.status = bench.status | DriveStatus::FAULT;
+        bench.step();
+    };
+    for close in [switched_off, drive_fault] {
+        let mut bench = Bench::enabled();
+        bench.status = bench.status | DriveStatus::BRAKE_RELEASED;
+        close(&mut bench);
+        assert_eq!(course(&bench.words(500)), [BRAKE]);
+        assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
+        bench.status = bench.status.with(DriveStatus::BRAKE_RELEASED, false);
+        assert_eq!(course(&bench.words(100)), [OFF]);
+        assert_eq!(bench.mode(), Mode::Fault);
     }
 }
 

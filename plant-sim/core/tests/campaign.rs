@@ -17,7 +17,7 @@ use firmware::control::controller::Config;
 use protocol::codec::{self, Encoder};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, Command, ControlWord, Emergency, Feedback, Message, Node, ResetReason,
+    Cause, Command, ControlWord, DriveStatus, Emergency, Feedback, Message, Node, ResetReason,
 };
 use protocol::time::{Duration, Instant};
 use sim::campaign::bounds::Bounds;
@@ -138,6 +138,14 @@ impl Planted {
             (Some(Defect::DamageUnseen), Ok(Message::Feedback(feedback))) => Some(feedback),
             (Some(Defect::OldFramesTaken), Ok(Message::Feedback(mut feedback))) => {
                 feedback.sample = self.heard.map_or(feedback.sample, |last| last.sample + 1);
+                Some(feedback)
+            }
+            // A brake that it looked at would not be let go of.
+            (
+                Some(Defect::NoWaitForTheBrake | Defect::BrakeForgotten | Defect::BrakeLate),
+                Ok(Message::Feedback(mut feedback)),
+            ) => {
+                feedback.status = feedback.status.with(DriveStatus::BRAKE_RELEASED, false);
                 Some(feedback)
             }
             (Some(Defect::Distracted), Ok(Message::Feedback(_)))

@@ -225,7 +225,7 @@ codes! {
         Overrun = 15, "overrun";
         /// The emergency stop was pressed or sent.
         EStop = 16, "estop";
-        /// The drives report a fault, or that they have switched off by themselves.
+        /// The drives report a fault, that they have switched off by themselves, or that the brake has not closed.
         DriveFault = 17, "drive-fault";
         /// The peer was built from another message table. Reserved: not raised yet.
         SchemaMismatch = 18, "schema-mismatch";

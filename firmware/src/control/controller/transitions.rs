@@ -1,7 +1,7 @@
 //! Entry actions of the states, and the events that change them.
 
 use nalgebra::Vector4;
-use protocol::messages::{Cause, ControlWord, Fault, LimitFlags};
+use protocol::messages::{Cause, ControlWord, DriveStatus, Fault, LimitFlags};
 
 use super::Controller;
 use crate::control::fault;
@@ -90,11 +90,22 @@ impl Controller {
         }
     }
 
-    /// Counts down the time of the brake.
-    pub(super) fn wait(&mut self, steps: u32) {
-        let (state, event) = self.state.wait(steps);
+    /// Counts down the time of the brake. One that has not closed by then does not hold the lift: torque goes on holding it,
+    /// until the brake has closed or the drives are off.
+    pub(super) fn wait(&mut self, readings: &Readings) {
+        let (state, event) = self.state.wait(readings.steps);
         self.state = state;
-        if let Some(event) = event {
+        let Some(event) = event else {
+            return;
+        };
+        let status = readings.status;
+        if event == Event::BrakeClosed && status.contains(DriveStatus::BRAKE_RELEASED) {
+            self.fail(Fault::value(
+                Cause::DriveFault,
+                f32::from(status.bits()),
+                0.0,
+            ));
+        } else {
             self.event(event);
         }
     }

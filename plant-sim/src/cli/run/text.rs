@@ -200,7 +200,7 @@ fn end(summary: &Summary, text: &mut String) {
         let rest = if summary.at_rest {
             "at rest, brake closed"
         } else {
-            "not at rest"
+            "not at rest on a closed brake"
         };
         line!(text, "  arm in the end    {rest}");
     }
