@@ -89,7 +89,7 @@ pub struct Drawing {
 
 /// Lengths and limits that are drawn; see [`crate::model`] for units.
 #[derive(Clone, Debug, Serialize)]
-struct Robot {
+pub struct Robot {
     a1: f64,
     a2: f64,
     d1: f64,

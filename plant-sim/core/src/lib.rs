@@ -7,6 +7,7 @@
 //! ```text
 //! run, setup, summary    a run from configuration to verdict
 //! scenario, selection    what to run: motions, law, mismatch
+//! live                   a run that goes on after its scenario, as a person asks
 //! rig                    the time line from event to event
 //! peer                   a node on it: controller (in process or elsewhere), drives and operator; the latter two
 //!                        know the controller by its messages alone
@@ -47,6 +48,7 @@ mod convert;
 pub mod curves;
 pub mod drives;
 pub mod faults;
+pub mod live;
 mod maths;
 pub mod metrics;
 pub mod model;

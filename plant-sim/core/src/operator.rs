@@ -2,6 +2,7 @@
 //!
 //! It knows the controller by its messages alone. Every wait has a limit, and its error names what is late.
 
+mod desk;
 pub(crate) mod program;
 
 use protocol::codec::{self, Encoder};
@@ -17,6 +18,8 @@ use crate::peer::{Outbox, Peer, PeerError};
 use crate::scenario::Scenario;
 use crate::world::{CellEvent, OperatorError, Spot, World};
 use program::{Action, Program, Task};
+
+pub use desk::{Answer, Desk, Order};
 
 /// Longest wait for a reply.
 const REPLY_LIMIT: Duration = Duration::from_secs(2);

@@ -15,6 +15,7 @@ use crate::world::World;
 #[derive(Debug)]
 pub struct Faulty<P> {
     peer: P,
+    node: Node,
     faults: Vec<Suffered>,
     random: Rand64,
 }
@@ -30,22 +31,42 @@ struct Suffered {
 impl<P: Peer> Faulty<P> {
     /// Wraps `peer`, which is `node`, in those faults that concern its frames.
     pub fn new(peer: P, node: Node, faults: &[Fault], seed: u64) -> Self {
-        let concerned = faults.iter().filter(|fault| match fault.what {
-            What::Frames(info, _) => info.sender.is_none_or(|sender| sender == node),
-            What::Silent(silent) => silent == node,
-            _ => false,
-        });
-        Self {
+        let mut faulty = Self {
             peer,
-            faults: concerned
-                .map(|fault| Suffered {
-                    fault: fault.clone(),
-                    history: VecDeque::new(),
-                })
-                .collect(),
+            node,
+            faults: Vec::new(),
             // Each node draws from its own sequence, so that the frames of one do not change the faults of another.
             random: Rand64::new(u128::from(seed) << 8 | node as u128),
+        };
+        for fault in faults {
+            faulty.suffer_also(fault);
         }
+        faulty
+    }
+
+    /// Adds a fault, if it concerns the frames of this node.
+    pub(crate) fn suffer_also(&mut self, fault: &Fault) {
+        let concerns = match fault.what {
+            What::Frames(info, _) => info.sender.is_none_or(|sender| sender == self.node),
+            What::Silent(silent) => silent == self.node,
+            _ => false,
+        };
+        if concerns {
+            self.faults.push(Suffered {
+                fault: fault.clone(),
+                history: VecDeque::new(),
+            });
+        }
+    }
+
+    /// The node itself.
+    pub(crate) fn peer(&self) -> &P {
+        &self.peer
+    }
+
+    /// The node itself.
+    pub(crate) fn peer_mut(&mut self) -> &mut P {
+        &mut self.peer
     }
 
     fn is_silent(&self, now: Instant) -> bool {

@@ -26,21 +26,28 @@ enum Deed {
 impl Injector {
     /// An injector of those faults that concern the robot; `seed` seeds the noise of encoders.
     pub fn new(faults: &[Fault], seed: u64) -> Self {
-        let of_robot = faults
-            .iter()
-            .filter(|fault| !matches!(fault.what, What::Frames(..) | What::Silent(_)));
-        let mut todo: Vec<_> = of_robot
-            .flat_map(
-                |Fault {
-                     what, from, until, ..
-                 }| {
-                    [(*from, *what, Deed::Break), (*until, *what, Deed::Repair)]
-                },
-            )
-            .filter(|(time, ..)| *time < Instant::MAX)
-            .collect();
-        todo.sort_by_key(|(time, ..)| std::cmp::Reverse(*time));
-        Self { todo, seed }
+        let mut injector = Self {
+            todo: Vec::new(),
+            seed,
+        };
+        for fault in faults {
+            injector.inject_also(fault);
+        }
+        injector
+    }
+
+    /// Adds a fault, if it concerns the robot.
+    pub(crate) fn inject_also(&mut self, fault: &Fault) {
+        let Fault {
+            what, from, until, ..
+        } = *fault;
+        if matches!(what, What::Frames(..) | What::Silent(_)) {
+            return;
+        }
+        let deeds = [(from, what, Deed::Break), (until, what, Deed::Repair)];
+        self.todo
+            .extend(deeds.into_iter().filter(|(time, ..)| *time < Instant::MAX));
+        self.todo.sort_by_key(|(time, ..)| std::cmp::Reverse(*time));
     }
 
     fn act(&self, plant: &mut Plant, what: What, deed: Deed) {

@@ -36,6 +36,8 @@ pub(crate) struct Task {
 pub(crate) struct Program {
     scenario: Scenario,
     next: Part,
+    /// Whether the last step is the end: the axes stay under torque.
+    stays: bool,
     /// Actions left of the current part.
     ready: VecDeque<Task>,
 }
@@ -59,7 +61,24 @@ impl Program {
         Self {
             scenario,
             next: Part::Begin,
+            stays: false,
             ready: VecDeque::new(),
+        }
+    }
+
+    /// The same, and the axes stay under torque at its end.
+    pub(crate) fn staying(self) -> Self {
+        Self {
+            stays: true,
+            ..self
+        }
+    }
+
+    /// Its cycles alone, for axes under torque.
+    pub(crate) fn of_cycles(self) -> Self {
+        Self {
+            next: Part::Step(0, 0),
+            ..self
         }
     }
 
@@ -194,6 +213,7 @@ impl Program {
                     Part::Step(cycle + 1, 0)
                 }
             }
+            Part::End if self.stays => return false,
             Part::End => {
                 self.put(
                     None,
@@ -219,7 +239,7 @@ impl Iterator for Program {
     }
 }
 
-fn announce(payload: &PayloadSpec) -> Action {
+pub(super) fn announce(payload: &PayloadSpec) -> Action {
     Action::Request(MotionRequest::SetPayload {
         mass: payload.mass as f32,
         com: payload.com_flange_frame.map(|x| x as f32),
