@@ -1,6 +1,7 @@
 //! Live view of a bus: statistics of the last second, and errors since the start.
 
 mod pages;
+mod rows;
 mod view;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -13,6 +14,7 @@ use protocol::wire::BitTiming;
 use trace::stats::{Gatherer, Statistics};
 use trace::{Entry, Record};
 
+pub use rows::{Happening, Row};
 pub use view::{Page, View};
 
 /// Span of the rates shown, us.
@@ -37,12 +39,15 @@ pub struct Monitor {
     newest: BTreeMap<Id, Record>,
     state: Option<State>,
     events: VecDeque<Event>,
+    happened: u64,
     missed: u64,
 }
 
 /// A past event that remains of interest.
 #[derive(Clone)]
 struct Event {
+    /// From 1 on.
+    number: u64,
     time_us: u64,
     text: String,
 }
@@ -75,6 +80,7 @@ impl Monitor {
             newest: BTreeMap::new(),
             state: None,
             events: VecDeque::new(),
+            happened: 0,
             missed: 0,
         }
     }
@@ -161,7 +167,9 @@ impl Monitor {
         if self.events.len() == EVENTS {
             self.events.pop_front();
         }
+        self.happened += 1;
         self.events.push_back(Event {
+            number: self.happened,
             time_us: self.newest_us,
             text,
         });

@@ -51,7 +51,6 @@ pub(super) fn bus(picture: &Picture) -> Vec<Line<'static>> {
                 let style = if number > 0 { ALARM } else { GREY };
                 Span::styled(format!(" {number:>6}"), style)
             };
-            let bad = total.duplicate + total.stale + total.crc + total.refused;
             Line::from(vec![
                 if silent {
                     Span::styled(text, GREY)
@@ -59,15 +58,23 @@ pub(super) fn bus(picture: &Picture) -> Vec<Line<'static>> {
                     Span::raw(text)
                 },
                 count(total.lost),
-                count(bad),
+                count(total.bad()),
             ])
         })
         .collect()
 }
 
 /// Identifiers of the watched bus.
-fn ids(statistics: &Statistics) -> impl Iterator<Item = &IdStatistics> {
+pub(super) fn ids(statistics: &Statistics) -> impl Iterator<Item = &IdStatistics> {
     statistics.interfaces.iter().flat_map(|bus| &bus.ids)
+}
+
+/// An identifier as statistics write it.
+pub(super) fn identifier(id: Id) -> String {
+    match id {
+        Id::Standard(id) => format!("{:03X}", id.as_raw()),
+        Id::Extended(id) => format!("{:08X}", id.as_raw()),
+    }
 }
 
 /// Every message with its newest fields.
@@ -77,10 +84,7 @@ pub(super) fn values(picture: &Picture, width: usize) -> Vec<Line<'static>> {
         .collect();
     let mut lines = Vec::new();
     for (id, record) in &picture.newest {
-        let id = match id {
-            Id::Standard(id) => format!("{:03X}", id.as_raw()),
-            Id::Extended(id) => format!("{:08X}", id.as_raw()),
-        };
+        let id = identifier(*id);
         let name = names.get(id.as_str()).copied().unwrap_or_default();
         lines.push(Line::styled(format!("{id} {name}"), BOLD));
         let fields = describe(record);

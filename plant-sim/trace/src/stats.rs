@@ -281,3 +281,11 @@ pub struct IdStatistics {
     /// Share of the bus time that they took, 0 to 1.
     pub load: f64,
 }
+
+impl IdStatistics {
+    /// Frames that a node does not use.
+    #[must_use]
+    pub fn bad(&self) -> u64 {
+        self.duplicate + self.stale + self.crc + self.refused
+    }
+}
