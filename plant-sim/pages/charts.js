@@ -128,7 +128,9 @@ class Chart {
     heights(low, high) {
         const values = [low, high, ...this.runs.flatMap((run) => this.limits(run).map(({ at }) => at))].filter((value) => value !== null);
         const [least, greatest] = [Math.min(...values), Math.max(...values)];
-        const room = (greatest - least) * 0.06 || Math.abs(greatest) * 0.1 || 1e-6;
+        const size = Math.max(Math.abs(greatest), Math.abs(least));
+        // What hardly changes beside its size is shown as such: its ticks would all say the same.
+        const room = Math.max((greatest - least) * 0.06, greatest - least < size * 1e-4 ? size * 5e-4 : 0) || size * 0.1 || 1e-6;
         return [least - room, greatest + room];
     }
 

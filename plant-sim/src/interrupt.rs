@@ -36,7 +36,8 @@ pub fn error() -> io::Error {
 }
 
 /// A pace that ends the run when a signal asks for it.
-pub(crate) struct Heeding<'p, P>(pub(crate) &'p mut P);
+#[derive(Debug)]
+pub struct Heeding<'p, P>(pub &'p mut P);
 
 impl<P: Pace> Pace for Heeding<'_, P> {
     fn sample(&mut self, now: Instant) -> io::Result<()> {

@@ -12,6 +12,7 @@
 //! mcap                   a trace or a run as MCAP, for Foxglove and Lichtblick
 //! play, record, monitor  a trace sent to a bus, a bus recorded, and a bus watched
 //! report                 the pages about runs (sources in pages)
+//! view                   the live page: a run or a bus in the browser
 //! verdicts               what became of requirements: in words, JUnit XML, needs.json and Markdown
 //! chart                  the SVG of plot and of external's histogram
 //! eval, input            models evaluated over the rows of a table; scenarios and robots from files
@@ -61,6 +62,7 @@ pub mod report;
 pub mod run;
 pub mod twin;
 pub mod verdicts;
+pub mod view;
 pub mod viewers;
 
 pub use terminal::say;

@@ -23,12 +23,13 @@ use crate::run::Results;
 pub const FILE: &str = "report.html";
 
 /// Parts of every page, in this order.
-const SHARED: [&str; 8] = [
+const SHARED: [&str; 9] = [
     include_str!("../pages/vendor/uplot/uPlot.iife.min.js"),
     include_str!("../pages/page.js"),
     include_str!("../pages/run.js"),
     include_str!("../pages/arm.js"),
     include_str!("../pages/charts.js"),
+    include_str!("../pages/plots.js"),
     include_str!("../pages/player.js"),
     include_str!("../pages/board.js"),
     include_str!("../pages/facts.js"),
@@ -143,6 +144,17 @@ pub fn what_if(module: &[u8]) -> String {
     // The module is compiled in the page, and runs in a thread that is made from a text of the page.
     let rights = [" 'wasm-unsafe-eval'", "; worker-src blob:"];
     html("What if", &data, &script, rights)
+}
+
+/// The page that shows what its server streams, and asks for what the server offers.
+pub fn live() -> String {
+    let own = [
+        include_str!("../pages/stream.js"),
+        include_str!("../pages/panel.js"),
+        include_str!("../pages/live.js"),
+    ];
+    let script = [&SHARED[..], &own].concat().join("\n");
+    html("Live", "", &script, ["", "; connect-src 'self'"])
 }
 
 /// A page that may do nothing but run its own script in its own style, and what the `rights` allow: more scripts, and the

@@ -37,6 +37,9 @@ run without --no-report
 refused "report.html: cannot be read" "$plant_sim" report "$work/gate" "$work/without"
 node tests/pages/report.mjs "$work/gate" "$work/failed" "$work/other" "$work/compare.html" "$pictures"
 
+echo "- the live page"
+node tests/pages/view.mjs "$plant_sim" "$pictures"
+
 echo "- the page that runs the simulation"
 need_cross wasm32-unknown-unknown
 plant-sim/web/build "$work/what-if.html" >/dev/null

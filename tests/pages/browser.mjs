@@ -23,24 +23,26 @@ export function check(holds, message) {
     }
 }
 
-/** Starts the browser, hands `open` to `use`, and fails if a page has complained or asked anybody for anything. */
+/** Starts the browser, hands `open` to `use`, and fails if a page has complained or asked anybody else for anything.
+ *  `open` takes a file, or the URL of a server, which may be asked; complaints that match `forgiven` are none. */
 export async function withBrowser(use) {
     const browser = await chromium.launch({ executablePath: process.env.CHROMIUM, args: ["--no-sandbox"] });
     const complaints = [];
-    const open = async (file, hash = "", screen = SCREENS[0], motion = "reduce") => {
+    const open = async (file, hash = "", screen = SCREENS[0], motion = "reduce", forgiven = /^$/) => {
         const context = await browser.newContext({ colorScheme: screen.colorScheme, viewport: screen.viewport, reducedMotion: motion });
         const page = await context.newPage();
-        const own = pathToFileURL(file).href;
+        const own = file.startsWith("http:") ? file : pathToFileURL(file).href;
+        const isOwn = (url) => (own.startsWith("http:") ? new URL(url).origin === new URL(own).origin : url.split("#")[0] === own);
         page.on("console", (message) => {
             // The last one is about these tests, which read pixels.
-            if (["error", "warning"].includes(message.type()) && !message.text().includes("willReadFrequently")) {
+            if (["error", "warning"].includes(message.type()) && !message.text().includes("willReadFrequently") && !forgiven.test(message.text())) {
                 complaints.push(`${file}: ${message.text()}`);
             }
         });
         page.on("pageerror", (error) => complaints.push(`${file}: ${error.stack}`));
         page.on("request", (request) => {
             // A blob is a part of the page.
-            if (request.url().split("#")[0] !== own && !request.url().startsWith("blob:")) {
+            if (!isOwn(request.url()) && !request.url().startsWith("blob:")) {
                 complaints.push(`${file} asks for ${request.url()}`);
             }
         });
@@ -74,6 +76,17 @@ export function pixels(page, label) {
         const { data, width } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
         return { data: [...data], width };
     }, label);
+}
+
+/** Keeps the picture in a canvas in the page itself; what comes back tells how many of its pixels have changed since. */
+export async function remember(page, label) {
+    const compare = await page.evaluateHandle((name) => {
+        const canvas = document.querySelector(`canvas[aria-label="${name}"], [aria-label="${name}"] canvas`);
+        const picture = () => new Uint32Array(canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.buffer);
+        const before = picture();
+        return () => picture().reduce((count, pixel, index) => count + (pixel === before[index] ? 0 : 1), 0);
+    }, label);
+    return () => compare.evaluate((changed) => changed());
 }
 
 /** How many pixels two pictures do not have in common. */

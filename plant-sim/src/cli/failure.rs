@@ -2,7 +2,9 @@
 
 use plant_sim::input::InputError;
 use plant_sim::output::OutputError;
+use plant_sim::record::RecordError;
 use plant_sim::run::ExecuteError;
+use plant_sim::view::ServeError;
 use terminal::{FAILED, USAGE};
 
 /// There was nothing that could have been good or bad.
@@ -71,6 +73,21 @@ impl From<OutputError> for Failure {
             OutputError::Taken { .. } => Self::usage(error),
             OutputError::Write { .. } | OutputError::Locked { .. } => Self::failed(error),
         }
+    }
+}
+
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        match error {
+            RecordError::Write { .. } => Self::failed(error),
+            _ => Self::usage(error),
+        }
+    }
+}
+
+impl From<ServeError> for Failure {
+    fn from(error: ServeError) -> Self {
+        Self::failed(error)
     }
 }
 

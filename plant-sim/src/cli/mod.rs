@@ -21,6 +21,7 @@ mod schema;
 mod timing;
 mod trace;
 mod values;
+mod view;
 mod what_if;
 
 use std::io::{self, Write as _};
@@ -63,6 +64,8 @@ enum Command {
     Timing(timing::TimingArgs),
     /// Compare two runs on one page.
     Report(report::ReportArgs),
+    /// Show a run, or a bus, on a page in the browser while it lives, and take part in it.
+    View(view::ViewArgs),
     /// Write the page that runs the simulation in a browser.
     WhatIf(what_if::WhatIfArgs),
     /// Inspect a recorded trace.
@@ -107,6 +110,7 @@ fn command(cli: Cli) -> Result<(), Failure> {
         Some(Command::Eval(args)) => eval::run(&args),
         Some(Command::Timing(args)) => timing::run(&args),
         Some(Command::Report(args)) => report::run(&args),
+        Some(Command::View(args)) => view::run(&args),
         Some(Command::WhatIf(args)) => what_if::run(&args),
         Some(Command::Trace(command)) => trace::run(&command),
         Some(Command::Monitor(args)) => monitor::run(&args),

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use link::{Link, LinkAddress};
-use plant_sim::record::{RecordError, Recording};
+use plant_sim::record::Recording;
 use plant_sim::{interrupt, say};
 use trace::Interface;
 
@@ -38,10 +38,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<(), Failure> {
     interrupt::listen()?;
     // The bus first: without one, no file is left behind.
     let mut link = Link::watch(&args.bus).map_err(|error| error.to_string())?;
-    let mut recording = Recording::create(&args.out, args.rotate).map_err(|error| match error {
-        RecordError::Write { .. } => Failure::failed(error.to_string()),
-        _ => Failure::usage(error.to_string()),
-    })?;
+    let mut recording = Recording::create(&args.out, args.rotate)?;
     say!("plant-sim: recording {}; Ctrl-C ends it", args.bus);
     let begun = Instant::now();
     let ended = record(&mut link, &args.bus, &mut recording);

@@ -195,12 +195,20 @@ impl Timing {
             ("feedback to command", &self.latency),
             ("sample due to command, age at use", &self.age),
         ] {
+            if times.count() == 0 {
+                continue;
+            }
             let [half, most, nearly] = [0.5, 0.99, 0.999].map(|share| us(times.quantile(share)));
             let _ = writeln!(
                 text,
                 "  {name:<33}{half:10.0} {most:10.0} {nearly:10.0} {:10.0}",
                 us(times.max())
             );
+        }
+        // A controller in this process answers at once.
+        if self.age.count() == 0 {
+            let _ = writeln!(text, "  overruns {}", self.overruns);
+            return text;
         }
         let _ = writeln!(
             text,

@@ -56,6 +56,11 @@ pub(crate) struct ConfigArgs {
 }
 
 impl ConfigArgs {
+    /// The robot as the controller knows it.
+    pub(crate) fn nominal(&self) -> Result<RobotModel, Failure> {
+        load(self.model.as_deref())
+    }
+
     /// What to run with what, each value checked as if the scenario's file had it.
     pub(crate) fn config(&self, scenario: &str) -> Result<RunConfig, Failure> {
         let mut changes = self.set.clone();
@@ -73,7 +78,7 @@ impl ConfigArgs {
         }
         let mut scenario = input::scenario(scenario, &changes)?;
         scenario.faults.extend(self.fault.iter().cloned());
-        let nominal = load(self.model.as_deref())?;
+        let nominal = self.nominal()?;
         if let Some(kg) = self.payload {
             let most = nominal.payload_max;
             if !(0.0..=most).contains(&kg) {

@@ -1,0 +1,379 @@
+//! What a page can ask for: the page draws what it finds here, and knows none of it by itself.
+
+use protocol::messages::{Law, Node};
+use protocol::table::TABLE;
+use serde::Serialize;
+use sim::faults::{KINDS, Kind};
+use sim::model::{AXES, RobotModel};
+use sim::scenario::{Scenario, Step};
+use sim::selection::LawChoice;
+
+/// Controls and buttons that belong together.
+#[derive(Debug, Serialize)]
+pub struct Group {
+    title: &'static str,
+    /// A sentence about it, where one is needed.
+    hint: Option<&'static str>,
+    fields: Vec<Field>,
+    buttons: Vec<Button>,
+}
+
+/// A value to set.
+#[derive(Debug, Serialize)]
+struct Field {
+    key: &'static str,
+    label: &'static str,
+    #[serde(flatten)]
+    kind: FieldKind,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum FieldKind {
+    Number(Number),
+    Choice {
+        choices: Vec<String>,
+        start: String,
+    },
+    /// One of many, each in a group of its own name and with the value that it takes.
+    Fault {
+        faults: Vec<Breakage>,
+    },
+}
+
+#[derive(Debug, Serialize)]
+struct Number {
+    least: f64,
+    greatest: f64,
+    step: f64,
+    start: f64,
+    unit: &'static str,
+}
+
+/// A kind of fault at a place.
+#[derive(Debug, Serialize)]
+struct Breakage {
+    place: String,
+    /// Without value and time.
+    text: String,
+    about: &'static str,
+    value: Option<Number>,
+}
+
+/// Something to ask for: a press sends an object named `ask` with the values of the fields in `takes` and those in `with`.
+#[derive(Debug, Serialize)]
+struct Button {
+    label: String,
+    ask: &'static str,
+    takes: &'static [&'static str],
+    with: serde_json::Value,
+    /// Always in sight.
+    urgent: bool,
+}
+
+fn button(label: &str, ask: &'static str, takes: &'static [&'static str]) -> Button {
+    Button {
+        label: label.into(),
+        ask,
+        takes,
+        with: serde_json::json!({}),
+        urgent: false,
+    }
+}
+
+fn urgent(label: &str, ask: &'static str) -> Button {
+    Button {
+        urgent: true,
+        ..button(label, ask, &[])
+    }
+}
+
+const fn number(
+    key: &'static str,
+    label: &'static str,
+    [least, greatest]: [f64; 2],
+    step: f64,
+    start: f64,
+    unit: &'static str,
+) -> Field {
+    Field {
+        key,
+        label,
+        kind: FieldKind::Number(Number {
+            least,
+            greatest,
+            step,
+            start,
+            unit,
+        }),
+    }
+}
+
+fn choice(
+    key: &'static str,
+    label: &'static str,
+    choices: Vec<String>,
+    start: impl ToString,
+) -> Field {
+    Field {
+        key,
+        label,
+        kind: FieldKind::Choice {
+            choices,
+            start: start.to_string(),
+        },
+    }
+}
+
+/// All that can be asked of a run of `scenario` with this robot.
+#[must_use]
+pub fn of_run(scenario: &Scenario, robot: &RobotModel) -> Vec<Group> {
+    vec![
+        Group {
+            title: "Drives",
+            hint: None,
+            fields: Vec::new(),
+            buttons: vec![
+                urgent("Stop", "stop"),
+                urgent("E-stop", "emergency-stop"),
+                button("Enable", "enable", &[]),
+                button("Disable", "disable", &[]),
+                button("Acknowledge", "fault-reset", &[]),
+                button("Run the scenario", "scenario", &[]),
+            ],
+        },
+        moves(scenario, robot),
+        jog(),
+        Group {
+            title: "Payload and law",
+            hint: None,
+            fields: vec![
+                number(
+                    "mass",
+                    "Payload",
+                    [0.0, robot.payload_max],
+                    0.5,
+                    scenario.payload.map_or(0.0, |payload| payload.mass),
+                    "kg",
+                ),
+                choice("law", "Control law", laws(), scenario.law),
+            ],
+            buttons: vec![
+                button("Carry", "payload", &["mass"]),
+                button("Use law", "law", &["law"]),
+            ],
+        },
+        Group {
+            title: "Break it",
+            hint: None,
+            fields: vec![
+                Field {
+                    key: "fault",
+                    label: "Fault",
+                    kind: FieldKind::Fault { faults: faults() },
+                },
+                number(
+                    "seconds",
+                    "Lasts (0: it stays)",
+                    [0.0, 3600.0],
+                    0.1,
+                    0.0,
+                    "s",
+                ),
+            ],
+            buttons: vec![button("Plant the fault", "fault", &["fault", "seconds"])],
+        },
+    ]
+}
+
+fn moves(scenario: &Scenario, robot: &RobotModel) -> Group {
+    // The first target of the scenario is one that can be reached.
+    let target = scenario.cycle.iter().find_map(|step| match step {
+        Step::Jump(jump) => Some((jump.to, jump.top, jump.clearance)),
+        Step::Line(line) => Some((line.to, line.to[2], 0.0)),
+        _ => None,
+    });
+    let start = scenario.start;
+    let (to, top, clearance) = target.unwrap_or((start, start[2], 0.0));
+    let millimetres = |metres: f64| (metres * 1e4).round() / 10.0;
+    let (geometry, limits) = (&robot.geometry, &robot.limits);
+    let reach = millimetres(geometry.a1 + geometry.a2);
+    let height = |lift: f64| millimetres(geometry.d1 + geometry.d2 - geometry.d4 - lift);
+    let heights = [height(limits.upper[2]), height(limits.lower[2])];
+    let yaw = (to[3].to_degrees() * 10.0).round() / 10.0;
+    let along = |key, label, place: usize| {
+        number(
+            key,
+            label,
+            [-reach, reach],
+            1.0,
+            millimetres(to[place]),
+            "mm",
+        )
+    };
+    Group {
+        title: "Move",
+        hint: None,
+        fields: vec![
+            along("x", "x", 0),
+            along("y", "y", 1),
+            number("z", "z", heights, 1.0, millimetres(to[2]), "mm"),
+            number("yaw", "Yaw", [-360.0, 360.0], 1.0, yaw, "°"),
+            number("top", "Top of a jump", heights, 1.0, millimetres(top), "mm"),
+            number(
+                "clearance",
+                "Clearance",
+                [0.0, 300.0],
+                1.0,
+                millimetres(clearance),
+                "mm",
+            ),
+            number("speed", "Speed", [1.0, 100.0], 1.0, 50.0, "%"),
+        ],
+        buttons: vec![
+            button(
+                "Jump",
+                "jump",
+                &["x", "y", "z", "yaw", "top", "clearance", "speed"],
+            ),
+            button("Line", "line", &["x", "y", "z", "yaw", "speed"]),
+        ],
+    }
+}
+
+fn jog() -> Group {
+    let buttons = AXES.iter().flat_map(|axis| {
+        [("−", -1.0), ("+", 1.0)].map(|(sign, direction)| Button {
+            with: serde_json::json!({ "axis": axis, "sign": direction }),
+            ..button(&format!("{axis} {sign}"), "jog", &["step", "speed"])
+        })
+    });
+    Group {
+        title: "Jog",
+        hint: Some(
+            "Small joint moves, at the speed above: the link has no message to move while a button is held.",
+        ),
+        fields: vec![number("step", "Step", [0.1, 45.0], 0.1, 5.0, "° or mm")],
+        buttons: buttons.collect(),
+    }
+}
+
+fn laws() -> Vec<String> {
+    use protocol::messages::Compensation;
+    let all = Law::ALL.iter().flat_map(|&law| {
+        let compensations: &[Compensation] = if law.takes_compensation() {
+            Compensation::ALL
+        } else {
+            &[Compensation::None]
+        };
+        compensations
+            .iter()
+            .map(move |&compensation| LawChoice { law, compensation }.to_string())
+    });
+    all.collect()
+}
+
+/// Every kind of fault at every place that has it.
+fn faults() -> Vec<Breakage> {
+    let kinds = KINDS.iter().flat_map(|kind| {
+        places(kind).into_iter().map(move |place| Breakage {
+            text: format!("{place}:{}", kind.name),
+            place,
+            about: kind.about,
+            value: kind.value.map(|value| Number {
+                least: value.least,
+                greatest: value.greatest,
+                step: 0.001,
+                // A hundredth of what is allowed can be seen and is no nonsense.
+                start: value.default.unwrap_or(value.greatest / 100.0),
+                unit: value.unit,
+            }),
+        })
+    });
+    let mut all: Vec<Breakage> = kinds.collect();
+    all.sort_by(|one, other| one.place.cmp(&other.place));
+    all
+}
+
+fn places(kind: &Kind) -> Vec<String> {
+    match kind.place {
+        "message" => TABLE.iter().map(|info| info.name.to_lowercase()).collect(),
+        "node" => Node::ALL.iter().map(ToString::to_string).collect(),
+        part if kind.has_axis => AXES.iter().map(|axis| format!("{part}:{axis}")).collect(),
+        part => vec![part.to_owned()],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Map, Value};
+    use sim::model::RobotModel;
+    use sim::scenario::Scenario;
+
+    use super::of_run;
+    use crate::view::wish::Asked;
+
+    /// What a button sends with every value as at the start; of faults, each one that can be chosen.
+    fn sent(offers: &Value) -> Vec<Value> {
+        let all = |key: &'static str| {
+            let groups = offers.as_array().unwrap().iter();
+            groups.flat_map(move |group| group[key].as_array().unwrap().clone())
+        };
+        let fields: Vec<Value> = all("fields").collect();
+        let starts = |key: &str| {
+            let field = fields.iter().find(|field| field["key"] == key).unwrap();
+            match field["faults"].as_array() {
+                None => vec![field["start"].clone()],
+                Some(faults) => faults
+                    .iter()
+                    .map(|fault| match &fault["value"]["start"] {
+                        Value::Null => fault["text"].clone(),
+                        start => format!("{}={start}", fault["text"].as_str().unwrap()).into(),
+                    })
+                    .collect(),
+            }
+        };
+        let mut sent = Vec::new();
+        for button in all("buttons") {
+            let mut one: Vec<Map<String, Value>> =
+                vec![button["with"].as_object().unwrap().clone()];
+            for key in button["takes"].as_array().unwrap() {
+                let key = key.as_str().unwrap();
+                let with = |start: &Value, given: &Map<String, Value>| {
+                    let mut given = given.clone();
+                    given.insert(key.into(), start.clone());
+                    given
+                };
+                let starts = starts(key);
+                let each = |start| one.iter().map(move |given| with(start, given));
+                one = starts.iter().flat_map(each).collect();
+            }
+            let name = button["ask"].as_str().unwrap();
+            sent.extend(
+                one.into_iter()
+                    .map(|given| serde_json::json!({ name: given })),
+            );
+        }
+        sent
+    }
+
+    #[test]
+    fn every_button_asks_for_something_that_is_understood() {
+        for name in ["gate", "screw", "palletise", "near-singular"] {
+            let scenario = Scenario::built_in(name).unwrap();
+            let offers = of_run(&scenario, &RobotModel::irb_930_22_105());
+            let sent = sent(&serde_json::to_value(offers).unwrap());
+            // More kinds of faults than there are kinds, for every place that has one.
+            assert!(sent.len() > 100, "{}", sent.len());
+            for request in sent {
+                let asked: Asked = serde_json::from_value(request.clone())
+                    .unwrap_or_else(|error| panic!("{request}: {error}"));
+                let wish = match &asked {
+                    Asked::Jog { .. } => asked.jog(Some([0.0; 4])).map(|(wish, _)| wish),
+                    _ => asked.wish(),
+                };
+                assert!(wish.is_ok(), "{request}: {wish:?}");
+            }
+        }
+    }
+}

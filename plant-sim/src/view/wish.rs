@@ -1,0 +1,183 @@
+//! What a page asks for, in its own words: `{"jump": {"x": 600, ...}}`, in millimetres, degrees and percents.
+
+use protocol::messages::{MotionRequest, Posture};
+use serde::Deserialize;
+use sim::faults::{Fault, FaultError};
+use sim::model::AXES;
+use sim::operator::Order;
+use sim::scenario::PayloadSpec;
+use sim::selection::LawChoice;
+
+/// A wish, ready for the loop.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Wish {
+    /// Something that the operator does.
+    Order(Order),
+    /// Something that breaks at the next sample, for so many seconds where it does not stay broken: `encoder:elbow:stuck`.
+    Break(String, Option<f64>),
+}
+
+/// A wish as the page writes it.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub(super) enum Asked {
+    Enable {},
+    Disable {},
+    FaultReset {},
+    Stop {},
+    EmergencyStop {},
+    Scenario {},
+    Jump {
+        x: f64,
+        y: f64,
+        z: f64,
+        yaw: f64,
+        top: f64,
+        clearance: f64,
+        speed: f64,
+    },
+    Line {
+        x: f64,
+        y: f64,
+        z: f64,
+        yaw: f64,
+        speed: f64,
+    },
+    /// A small move of one axis from where it stands.
+    Jog {
+        axis: String,
+        step: f64,
+        /// 1 or -1.
+        sign: f64,
+        speed: f64,
+    },
+    Payload {
+        mass: f64,
+    },
+    Law {
+        law: LawChoice,
+    },
+    Fault {
+        fault: String,
+        seconds: f64,
+    },
+}
+
+/// The axis that moves in metres.
+const LIFT: usize = 2;
+
+/// Joint positions that a jog begins from.
+pub(super) type Stand = Option<[f32; 4]>;
+
+impl Asked {
+    /// The wish, where it does not depend on where the arm is.
+    ///
+    /// # Errors
+    /// What is wrong, and what is allowed.
+    pub(super) fn wish(&self) -> Result<Wish, String> {
+        let request = |request| Ok(Wish::Order(Order::Request(request)));
+        match self {
+            Self::Enable {} => request(MotionRequest::Enable),
+            Self::Disable {} => request(MotionRequest::Disable),
+            Self::FaultReset {} => request(MotionRequest::FaultReset),
+            Self::Stop {} => request(MotionRequest::Stop),
+            Self::EmergencyStop {} => Ok(Wish::Order(Order::EmergencyStop)),
+            Self::Scenario {} => Ok(Wish::Order(Order::Scenario)),
+            &Self::Jump {
+                x,
+                y,
+                z,
+                yaw,
+                top,
+                clearance,
+                speed,
+            } => request(MotionRequest::Jump {
+                target: pose([x, y, z, yaw]),
+                top: metres(top),
+                clearance: metres(clearance),
+                speed: share(speed),
+                posture: Posture::NEAREST,
+            }),
+            &Self::Line {
+                x,
+                y,
+                z,
+                yaw,
+                speed,
+            } => request(MotionRequest::MoveLine {
+                target: pose([x, y, z, yaw]),
+                speed: share(speed),
+                posture: Posture::NEAREST,
+            }),
+            Self::Jog { .. } => Err("a jog begins where the arm is".into()),
+            Self::Payload { mass } => Ok(Wish::Order(Order::Carry(PayloadSpec::compact(*mass)))),
+            Self::Law { law } => request(MotionRequest::SelectLaw {
+                law: law.law,
+                compensation: law.compensation,
+            }),
+            Self::Fault { fault, seconds } => {
+                let seconds = (*seconds > 0.0).then_some(*seconds);
+                // Whether it is one shows at any time.
+                at(fault, 0.0, seconds).map_err(|error| error.to_string())?;
+                Ok(Wish::Break(fault.clone(), seconds))
+            }
+        }
+    }
+}
+
+impl Asked {
+    /// A move of one axis from `stand`, and where it leads to.
+    ///
+    /// # Errors
+    /// It is no jog, or nobody knows where the arm is.
+    pub(super) fn jog(&self, stand: Stand) -> Result<(Wish, [f32; 4]), String> {
+        let Self::Jog {
+            axis,
+            step,
+            sign,
+            speed,
+        } = self
+        else {
+            return Err("not a jog".into());
+        };
+        let place = AXES
+            .iter()
+            .position(|name| name == axis)
+            .ok_or_else(|| format!("there is no axis {axis:?}; allowed: {}", AXES.join(", ")))?;
+        let mut target =
+            stand.ok_or("the drives have sent no feedback yet: where the arm is, is not known")?;
+        let step = sign * step;
+        target[place] += if place == LIFT {
+            metres(step)
+        } else {
+            step.to_radians() as f32
+        };
+        let request = MotionRequest::MoveJoint {
+            target,
+            speed: share(*speed),
+        };
+        Ok((Wish::Order(Order::Request(request)), target))
+    }
+}
+
+/// The fault from `t` on, s, for so many seconds.
+pub(super) fn at(fault: &str, t: f64, seconds: Option<f64>) -> Result<Fault, FaultError> {
+    // To the microsecond, without the digits that rounding leaves.
+    let short = |t: f64| (t * 1e6).round() / 1e6;
+    let until = seconds.map_or_else(String::new, |seconds| format!("..{}s", short(t + seconds)));
+    format!("{fault}@{}s{until}", short(t)).parse()
+}
+
+fn metres(millimetres: f64) -> f32 {
+    (millimetres / 1000.0) as f32
+}
+
+/// A share of what percents are of.
+fn share(percents: f64) -> f32 {
+    (percents / 100.0) as f32
+}
+
+/// x, y, z in mm and yaw in degrees.
+fn pose([x, y, z, yaw]: [f64; 4]) -> [f32; 4] {
+    [metres(x), metres(y), metres(z), yaw.to_radians() as f32]
+}
