@@ -35,8 +35,11 @@ const BATCH: usize = 4096;
 /// Arguments of `view`.
 #[derive(Args)]
 pub(super) struct ViewArgs {
-    #[arg(long, value_name = "NAME|FILE", default_value = "gate", help = what("show"))]
-    scenario: String,
+    #[arg(value_name = "NAME|FILE", default_value = "gate", help = what("show"))]
+    name: String,
+    /// The same, written as for run.
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "name")]
+    scenario: Option<String>,
     #[command(flatten)]
     config: ConfigArgs,
     /// Watch this bus instead of running a scenario: socketcan:INTERFACE, slcan:TERMINAL, slcan:tcp:HOST:PORT or
@@ -44,7 +47,7 @@ pub(super) struct ViewArgs {
     #[arg(
         long,
         value_name = "BUS",
-        conflicts_with_all = ["scenario", "set", "law", "payload", "cycles", "rate", "fault", "seed", "plant_model"]
+        conflicts_with_all = ["name", "scenario", "set", "law", "payload", "cycles", "rate", "fault", "seed", "plant_model"]
     )]
     bus: Option<LinkAddress>,
     /// Bit rates of that bus, bit/s, for its load.
@@ -72,7 +75,8 @@ pub(super) fn run(args: &ViewArgs) -> Result<(), Failure> {
 
 /// A run of its own, in real time.
 fn live(args: &ViewArgs) -> Result<(), Failure> {
-    let config = args.config.config(&args.scenario)?;
+    let scenario = args.scenario.as_ref().unwrap_or(&args.name);
+    let config = args.config.config(scenario)?;
     config.rig().map_err(Failure::usage)?;
     interrupt::listen()?;
     let recording = recording(args)?;

@@ -45,7 +45,7 @@ fn what_cannot_be_shown_is_refused() {
             "cannot be used with",
         ),
         (
-            &["--no-open", "--port", "0", "--scenario", "none"],
+            &["--no-open", "--port", "0", "none"],
             2,
             "no scenario 'none'",
         ),
