@@ -63,6 +63,7 @@ class Live extends Plots {
         this.holding = element("button", { type: "button", "aria-pressed": "false", click: () => this.hold(!this.held) }, "Hold the picture");
         this.panel = element("div", { class: "panel" });
         this.scenes = [new LiveTop(), new LiveSide()];
+        this.mark = element("span", { class: "key key-alarm" }, "target of the next move");
         this.title = element("h1", {}, "Live");
         this.compose();
         new Stream({
@@ -90,7 +91,7 @@ class Live extends Plots {
     compose() {
         const [top, side] = this.scenes;
         const figure = (scene, caption) => element("figure", { class: "scene" }, element("figcaption", {}, element("b", {}, caption)), scene.view.canvas);
-        const key = element("p", { class: "hint always" }, element("span", { class: "key key-reference" }, "reference"), element("span", { class: "key key-actual" }, "actual"), element("span", { class: "key key-alarm" }, "target of the next move"));
+        const key = element("p", { class: "hint always" }, element("span", { class: "key key-reference" }, "reference"), element("span", { class: "key key-actual" }, "actual"), this.mark);
         const log = element("div", { class: "log", tabindex: 0, role: "log", "aria-label": "What happens" }, this.words);
         const heads = ["Identifier", "Message", "per second", "lost", "bad", "newest"].map((name) => element("th", { scope: "col" }, name));
         const table = element("table", { class: "frames" }, element("thead", {}, element("tr", {}, ...heads)), this.frames);
@@ -135,6 +136,7 @@ class Live extends Plots {
     aim() {
         const values = this.controls.values;
         const target = ["x", "y", "z"].every((key) => values.has(key)) ? ["x", "y", "z"].map((key) => values.get(key)() / 1000) : null;
+        this.mark.hidden = target === null;
         this.scenes.forEach((scene) => {
             scene.target = target;
             scene.view.draw();

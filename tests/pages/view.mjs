@@ -4,6 +4,11 @@
 //
 // Pictures of every screen go into the last folder.
 import { spawn } from "node:child_process";
+import { once } from "node:events";
+import { mkdtempSync } from "node:fs";
+import { createServer } from "node:net";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { createInterface } from "node:readline";
 import { SCREENS, accessible, check, remember, sound, withBrowser } from "./browser.mjs";
 
@@ -32,6 +37,15 @@ async function start(port = 0, ...args) {
         }
     }
     throw new Error("the program names no page");
+}
+
+/** A port that nobody listens on. */
+async function freePort() {
+    const server = createServer().listen(0, "127.0.0.1");
+    await once(server, "listening");
+    const { port } = server.address();
+    server.close();
+    return port;
 }
 
 /** Waits until the page says this of the controller's state. */
@@ -192,6 +206,25 @@ try {
         await acceptedBy(back, "Disable", "disable");
         const said = await second.end();
         check(/asked for: \d+ done, 0 refused/.test(said), said);
+
+        // The bus of another run is shown, and not asked for anything.
+        const bus = `slcan:tcp:127.0.0.1:${await freePort()}`;
+        const other = spawn(program, ["run", "--scenario", "long-run", "--listen", bus, "--quiet", "--no-trace", "--no-report", "--out", mkdtempSync(join(tmpdir(), "watched-"))], { stdio: ["ignore", "ignore", "pipe"] });
+        started.add(other);
+        await once(other.stderr, "data");
+        const watching = await start(0, "--bus", bus);
+        const watched = await open(watching.url, "", SCREENS[0], "no-preference");
+        await state(watched, "moving");
+        const moved = await remember(watched, ARM);
+        await watched.waitForTimeout(1000);
+        check((await moved()) > 500, "the arm of a watched bus does not move");
+        check((await watched.getByRole("button").allInnerTexts()).join() === "Hold the picture", "a watched bus is asked for something");
+        await watched.getByRole("rowheader", { name: "1C0" }).waitFor();
+        await watched.screenshot({ path: `${pictures}/live-watched.png` });
+        await sound(watched);
+        await accessible(watched);
+        await watched.context().close();
+        check(/frames of slcan:tcp:/.test(await watching.end()), "nothing is said of the watched bus");
     });
 } finally {
     started.forEach((child) => child.kill("SIGKILL"));

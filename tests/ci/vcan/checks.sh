@@ -80,6 +80,23 @@ passed "plant killed: the controller waited and served the next"
 kill -INT $controller; wait $controller || fail "Ctrl-C did not end the controller cleanly"
 grep -q "stopped in" controller.err || fail "controller: final report"
 
+# --- the live page of a bus of others
+"$bin/plant-sim" view --bus socketcan:vcan0 --no-open --port 0 >view.txt 2>view.err & view=$!
+await view.err "the page is at"
+port=$(sed -n 's,.*http://127.0.0.1:\([0-9]*\)/.*,\1,p' view.err)
+exec 5<>"/dev/tcp/127.0.0.1/$port"
+printf 'GET /stream HTTP/1.1\r\nHost: 127.0.0.1:%s\r\n\r\n' "$port" >&5
+cat <&5 >stream.txt & stream=$!
+controller
+plant --cycles 1 --out seen >seen.txt 2>seen.err || fail "run under a live page"
+await stream.txt 'mode enabled'
+kill -INT $view; wait $view || fail "Ctrl-C did not end the live page cleanly"
+wait $stream || true
+exec 5>&-
+grep -q 'frames of socketcan:vcan0' view.txt || fail "live page: no summary"
+kill -INT $controller; wait $controller || fail "Ctrl-C did not end the controller cleanly"
+passed "a live page shows vcan0"
+
 # --- real time. A machine too slow for it may stop the arm; the exchange itself must work.
 controller --real-time --rate 200
 plant --rate 200 --cycles 1 --real-time --out real >real.txt 2>real.err || true
