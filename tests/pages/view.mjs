@@ -5,7 +5,7 @@
 // Pictures of every screen go into the last folder.
 import { spawn } from "node:child_process";
 import { once } from "node:events";
-import { mkdtempSync } from "node:fs";
+import { mkdtempSync, rmSync } from "node:fs";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -16,6 +16,7 @@ const [program, pictures] = process.argv.slice(2);
 const ARM = "The arm from above, with the path of its tool";
 const SIDE = "The arm from the side, with the path of its tool";
 const started = new Set();
+const folder = mkdtempSync(join(tmpdir(), "live-"));
 
 /** Starts the program; where its page is, and how to end it as Ctrl-C does. */
 async function start(port = 0, ...args) {
@@ -209,7 +210,7 @@ try {
 
         // The bus of another run is shown, and not asked for anything.
         const bus = `slcan:tcp:127.0.0.1:${await freePort()}`;
-        const other = spawn(program, ["run", "--scenario", "long-run", "--listen", bus, "--quiet", "--no-trace", "--no-report", "--out", mkdtempSync(join(tmpdir(), "watched-"))], { stdio: ["ignore", "ignore", "pipe"] });
+        const other = spawn(program, ["run", "--scenario", "long-run", "--listen", bus, "--quiet", "--no-trace", "--no-report", "--out", folder], { stdio: ["ignore", "ignore", "pipe"] });
         started.add(other);
         await once(other.stderr, "data");
         const watching = await start(0, "--bus", bus);
@@ -228,5 +229,6 @@ try {
     });
 } finally {
     started.forEach((child) => child.kill("SIGKILL"));
+    rmSync(folder, { recursive: true });
 }
 console.log("  live: every button acts over the bus, strangers look at most, and the page comes back after the program; axe finds nothing");
