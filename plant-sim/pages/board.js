@@ -81,10 +81,14 @@ class Board extends Plots {
         this.player.seek(t);
     }
 
+    /** The faults and requirements of every run. */
     list() {
-        const [{ faults, results }] = this.runs;
         const fault = ({ time_s: t, text }) => element("li", {}, momentLink(t), ` ${text}`);
-        const table = requirements(results.requirements);
-        this.events.replaceChildren(...(faults.length ? [element("ul", {}, ...faults.map(fault))] : [element("p", {}, "No fault.")]), ...table);
+        const listed = ({ faults, results }, number) => [
+            ...(this.runs.length > 1 ? [element("h3", {}, runKey(number), ` ${results.scenario}`)] : []),
+            faults.length ? element("ul", {}, ...faults.map(fault)) : element("p", {}, "No fault."),
+            ...requirements(results.requirements, this.runs.length > 1 ? `Requirements of ${"AB"[number]}` : "Requirements"),
+        ];
+        this.events.replaceChildren(...this.runs.flatMap(listed));
     }
 }

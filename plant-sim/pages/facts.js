@@ -56,8 +56,8 @@ function limitOf({ quantity, axis, state, min, max, cycle, during }) {
     return `${quantity}${of} ${limit}${where}`;
 }
 
-/** The requirements of a run with their verdicts: a table, or nothing where there are none. */
-function requirements(all) {
+/** The requirements of a run with their verdicts: a table of this name, or nothing where there are none. */
+function requirements(all, name) {
     if (all.length === 0) {
         return [];
     }
@@ -71,13 +71,18 @@ function requirements(all) {
     const heads = ["Requirement", "Verdict", "Text", "Limit", "Value", "Margin", "Nearest at"];
     const head = element("thead", {}, element("tr", {}, ...heads.map((name) => element("th", { scope: "col" }, name))));
     const table = element("table", { class: "verdicts" }, head, element("tbody", {}, ...all.map(row)));
-    return [element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Requirements" }, table)];
+    return [element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": name }, table)];
+}
+
+/** The letter of a run, in its colour. */
+function runKey(number) {
+    return element("span", { class: `key key-${RUN_COLOURS[number]}` }, "AB"[number]);
 }
 
 /** A run's name in a line, and whether it got to its end. */
 function title(run, number, all) {
     const { results } = run;
-    const key = all.length > 1 ? element("span", { class: `key key-${RUN_COLOURS[number]}` }, "AB"[number]) : null;
+    const key = all.length > 1 ? runKey(number) : null;
     const verdict = element("span", { class: results.passed ? "good" : "bad" }, outcome(results));
     return element("p", { class: "title" }, key, `${all.length > 1 ? ` ${results.scenario}: ` : ""}${results.law}, ${results.payload_kg} kg, ${results.rate_hz} Hz, ${results.cycles} ${results.cycles === 1 ? "cycle" : "cycles"} – `, verdict);
 }
@@ -90,7 +95,7 @@ function table(runs) {
         const unlike = values.some((value) => value !== values[0]);
         return element("tr", { class: unlike ? "unlike" : null }, element("th", { scope: "row" }, name), ...values.map((value) => element("td", {}, value)));
     });
-    const heads = runs.map((_, number) => element("th", { scope: "col" }, element("span", { class: `key key-${RUN_COLOURS[number]}` }, "AB"[number])));
+    const heads = runs.map((_, number) => element("th", { scope: "col" }, runKey(number)));
     const head = runs.length > 1 ? element("thead", {}, element("tr", {}, element("td"), ...heads)) : null;
     return element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Facts and results" }, element("table", {}, head, element("tbody", {}, ...rows)));
 }

@@ -98,6 +98,25 @@ export function unlike(one, other) {
     return count;
 }
 
+/** The numbers of the pixels of a colour. */
+export function places({ data }, [red, green, blue]) {
+    const found = new Set();
+    for (let index = 0; index < data.length; index += 4) {
+        if (data[index] === red && data[index + 1] === green && data[index + 2] === blue) {
+            found.add(index / 4);
+        }
+    }
+    return found;
+}
+
+/** Red, green and blue of a colour of the style sheet. */
+export function rgb(page, name) {
+    return page.evaluate((colour) => {
+        const hex = getComputedStyle(document.documentElement).getPropertyValue(`--${colour}`).trim();
+        return [1, 3, 5].map((place) => parseInt(hex.slice(place, place + 2), 16));
+    }, name);
+}
+
 /** Nothing is wider than the screen, and no number on the page is missing. */
 export async function sound(page) {
     const wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);

@@ -4,7 +4,7 @@
 //
 // Pictures of every screen go into the last folder.
 import { readFileSync } from "node:fs";
-import { SCREENS, accessible, check, pixels, sound, unlike, withBrowser } from "./browser.mjs";
+import { SCREENS, accessible, check, pixels, places, rgb, sound, unlike, withBrowser } from "./browser.mjs";
 
 const [run, failed, missed, comparison, pictures] = process.argv.slice(2);
 const CHARTS = [
@@ -19,24 +19,10 @@ function truth() {
 }
 
 /** The middle of the pixels of a colour, and how many there are. */
-function middle({ data, width }, [red, green, blue]) {
-    let [count, x, y] = [0, 0, 0];
-    for (let index = 0; index < data.length; index += 4) {
-        if (data[index] === red && data[index + 1] === green && data[index + 2] === blue) {
-            count += 1;
-            x += (index / 4) % width;
-            y += Math.floor(index / 4 / width);
-        }
-    }
-    return { count, x: x / count, y: y / count };
-}
-
-/** Red, green and blue of a colour of the style sheet. */
-function rgb(page, name) {
-    return page.evaluate((colour) => {
-        const hex = getComputedStyle(document.documentElement).getPropertyValue(`--${colour}`).trim();
-        return [1, 3, 5].map((place) => parseInt(hex.slice(place, place + 2), 16));
-    }, name);
+function middle(picture, colour) {
+    const found = [...places(picture, colour)];
+    const mean = (part) => found.reduce((sum, place) => sum + part(place), 0) / found.length;
+    return { count: found.length, x: mean((place) => place % picture.width), y: mean((place) => Math.floor(place / picture.width)) };
 }
 
 // The slider takes whole milliseconds in their shortest form alone; a time of the table has a digit of rounding.
@@ -108,9 +94,9 @@ async function buttonsAct(page) {
 }
 
 /** Every requirement has its verdict, a mark among the states, and a link to the moment at which it was nearest to its limit. */
-async function requirementsLeadToTheirMoments(page, folder) {
+async function requirementsLeadToTheirMoments(page, folder, table = "Requirements") {
     const { requirements } = JSON.parse(readFileSync(`${folder}/summary.json`, "utf8"));
-    const rows = page.getByRole("region", { name: "Requirements" }).locator("tbody tr");
+    const rows = page.getByRole("region", { name: table, exact: true }).locator("tbody tr");
     check((await rows.count()) === requirements.length, `${await rows.count()} requirements`);
     for (const [index, { id, met, time_s: t }] of requirements.entries()) {
         const row = rows.nth(index);
@@ -154,6 +140,9 @@ await withBrowser(async (open) => {
     await buttonsAct(page);
     await requirementsLeadToTheirMoments(page, run);
     await requirementsLeadToTheirMoments(await open(`${missed}/report.html`), missed);
+    const both = await open(comparison);
+    await requirementsLeadToTheirMoments(both, run, "Requirements of A");
+    await requirementsLeadToTheirMoments(both, missed, "Requirements of B");
 
     const moved = await open(`${run}/report.html`, "", SCREENS[0], "no-preference");
     await moved.waitForFunction(() => Number(document.querySelector("input[aria-label=Time]").value) > 0);
