@@ -91,7 +91,10 @@ impl Scribe {
             match heard.recv_timeout(GLIMPSE) {
                 Ok(heard) => self.hear(heard),
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return,
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.glimpse();
+                    return self.table();
+                }
             }
             if glimpsed.elapsed() >= GLIMPSE {
                 glimpsed = Instant::now();

@@ -1,7 +1,9 @@
 //! The program: what it refuses, and that it ends in order.
 
+use std::fs::Permissions;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener};
+use std::os::unix::fs::PermissionsExt as _;
 use std::process::{Child, ChildStderr, Command, Output, Stdio};
 
 use rustix::process::{Pid, Signal, kill_process};
@@ -186,4 +188,53 @@ fn a_watched_bus_is_shown_and_not_asked_for_anything() {
     }
     let text = end(program);
     assert!(text.contains("1 frames of slcan:listen:"), "{text}");
+}
+
+#[test]
+fn the_page_opens_in_a_browser_unless_it_is_not_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let (browser, opened) = (folder.path().join("xdg-open"), folder.path().join("opened"));
+    // A new name appears with its content.
+    let script = format!(
+        "#!/bin/sh\necho \"$1\" >{0}.new\nmv {0}.new {0}\n",
+        opened.display()
+    );
+    std::fs::write(&browser, script).unwrap();
+    std::fs::set_permissions(&browser, Permissions::from_mode(0o755)).unwrap();
+    let path = format!(
+        "{}:{}",
+        folder.path().display(),
+        std::env::var("PATH").unwrap()
+    );
+    for no_open in [false, true] {
+        let mut program = view(&["--port", "0"])
+            .args(no_open.then_some("--no-open"))
+            .env("PATH", &path)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut said = BufReader::new(program.stderr.take().unwrap()).lines();
+        let url = said.next().unwrap().unwrap();
+        // Said after the browser has been started.
+        assert!(
+            said.next()
+                .unwrap()
+                .unwrap()
+                .contains("begins when somebody looks")
+        );
+        if !no_open {
+            while !opened.exists() {
+                std::thread::yield_now();
+            }
+            let opened = std::fs::read_to_string(&opened).unwrap();
+            assert!(
+                opened.starts_with("http://127.0.0.1:") && url.ends_with(opened.trim()),
+                "{opened}"
+            );
+            std::fs::remove_file(folder.path().join("opened")).unwrap();
+        }
+        end(program);
+    }
+    assert!(!opened.exists(), "--no-open opens a browser");
 }
