@@ -32,7 +32,7 @@ pub fn asked() -> bool {
 
 /// The error of work that a signal has ended.
 pub fn error() -> io::Error {
-    io::Error::other("ended by a signal (Ctrl-C or SIGTERM)")
+    io::Error::other("ended by a signal (Ctrl-C, SIGTERM or SIGHUP)")
 }
 
 /// A pace that ends the run when a signal asks for it.

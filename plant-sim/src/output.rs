@@ -169,6 +169,51 @@ fn through(path: &Path) -> Result<BufWriter<fs::File>, OutputError> {
         })
 }
 
+/// Refuses outputs of a command that would replace one of its inputs or each other. Inputs that are no files do not matter.
+///
+/// # Errors
+/// [`OutputError::Taken`].
+pub fn distinct<'p>(
+    inputs: impl IntoIterator<Item = &'p Path>,
+    outputs: impl IntoIterator<Item = &'p Path>,
+) -> Result<(), OutputError> {
+    let inputs = inputs
+        .into_iter()
+        .filter_map(|path| fs::canonicalize(path).ok());
+    let mut known: Vec<_> = inputs
+        .map(|place| (place, "an input of this command"))
+        .collect();
+    for path in outputs {
+        let Some(place) = place(path) else {
+            continue;
+        };
+        if let Some(&(_, what)) = known.iter().find(|(other, _)| *other == place) {
+            return Err(OutputError::Taken {
+                path: path.into(),
+                what,
+                hint: "name another file",
+            });
+        }
+        known.push((place, "another output of this command"));
+    }
+    Ok(())
+}
+
+/// Where a regular file is or would be. Several outputs may go to one device.
+fn place(path: &Path) -> Option<PathBuf> {
+    match fs::metadata(path) {
+        Ok(there) if !there.is_file() => None,
+        Ok(_) => fs::canonicalize(path).ok(),
+        Err(_) => {
+            let folder = path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty());
+            let folder = fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?;
+            Some(folder.join(path.file_name()?))
+        }
+    }
+}
+
 fn taken(path: &Path, there: FileType, hint: &'static str) -> OutputError {
     let what = match there {
         there if there.is_dir() => "a folder",

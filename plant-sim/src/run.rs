@@ -1,6 +1,6 @@
 //! One run with its results on disk: a trace, the truth and a summary.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use firmware::control::controller::Config;
@@ -66,6 +66,11 @@ const RESULTS: [&str; 5] = [
     "report.html",
     "controller.log",
 ];
+
+/// The files that a run may write into the folder `out`.
+pub fn results(out: &Path) -> [PathBuf; RESULTS.len()] {
+    RESULTS.map(|name| out.join(name))
+}
 
 /// The folder `out` for the results of a run.
 ///

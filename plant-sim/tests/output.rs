@@ -133,6 +133,38 @@ fn older_results_do_not_lie_beside_new_ones_and_stay_where_nothing_was_run() {
 }
 
 #[test]
+fn no_output_replaces_an_input_or_another_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scenario = sim::scenario::built_in("gate").unwrap();
+    fs::write(path.join("my.toml"), scenario).unwrap();
+    let robot = include_str!("../models/irb930-12-0.85.json");
+    fs::write(path.join("r.json"), robot).unwrap();
+    for (arguments, what) in [
+        ("run --scenario my.toml --junit my.toml", "an input"),
+        ("run my.toml --markdown ./my.toml", "an input"),
+        ("run --model r.json --needs r.json", "an input"),
+        ("run --plant-model r.json --mcap r.json", "an input"),
+        ("run --junit x --needs x", "another output"),
+        ("run --out o --junit o/../o/summary.json", "another output"),
+        ("model r.json --out r.json", "an input"),
+    ] {
+        fs::create_dir_all(path.join("o")).unwrap();
+        let refused = plant_sim()
+            .args(arguments.split(' '))
+            .current_dir(path)
+            .output()
+            .unwrap();
+        let said = says(&refused);
+        assert_eq!(refused.status.code(), Some(2), "{arguments}: {said}");
+        assert!(said.contains(what), "{arguments}: {said}");
+        assert_eq!(fs::read_to_string(path.join("my.toml")).unwrap(), scenario);
+        assert_eq!(fs::read_to_string(path.join("r.json")).unwrap(), robot);
+        assert_eq!(names(path), ["my.toml", "o", "r.json"], "{arguments}");
+    }
+}
+
+#[test]
 fn what_is_no_regular_file_is_never_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();

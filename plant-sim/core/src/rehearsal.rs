@@ -37,7 +37,7 @@ pub struct Plan {
     pub robot: String,
     /// Cycles.
     pub cycles: u32,
-    /// All of it, from switching on to switching off, s.
+    /// All of it as planned, from switching on to switching off, without the time until an operator hears of each arrival, s.
     pub duration_s: f64,
     /// Moves of the cycles that were planned: those after them are the same as in the last.
     pub moves: Vec<Move>,

@@ -45,7 +45,18 @@ fn what_does_not_fit_the_text_is_refused() {
         ),
         ("dwell = 0.1", "wait = 0.1", "unknown word `wait`"),
         ("dwell = 0.1", "dwel = 0.1", "did you mean dwell?"),
-        ("cycles = 2", "cycles = -2", "a whole number from 0 to"),
+        ("cycles = 2", "cycles = -2", "a whole number, 0 or more"),
+        (
+            "dwell = 0.1",
+            "dwell = 0.1\nstop = 0.1",
+            "expected one step",
+        ),
+        ("dwell = 0.1", "", "expected a step"),
+        (
+            "dwell = 0.1",
+            "place = 1",
+            "expected {}: a place has no values",
+        ),
         (
             "cycles = 2",
             "cycles = 2.5",

@@ -3,7 +3,7 @@
 //! Model files are only read and checked here. The controller takes the output: its own numbers in its own precision,
 //! which read back exactly.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use firmware::mechanics::arm::ArmModel;
@@ -30,6 +30,8 @@ pub(super) fn run(args: &ModelArgs) -> Result<(), Failure> {
     arm.validate()
         .map_err(|error| format!("the controller cannot use this robot: {error}"))?;
     let text = serde_json::to_string_pretty(&arm).map_err(|error| error.to_string())? + "\n";
+    let input = args.robot.as_deref().map(Path::new);
+    output::distinct(input, args.out.as_deref())?;
     match &args.out {
         Some(path) => output::write(path, &text)?,
         None => show(&text)?,

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use clap::Args;
 use plant_sim::external::{LockStep, RealTime, WallClock};
 use plant_sim::interrupt;
-use plant_sim::output::Folder;
+use plant_sim::output::{self, Folder};
 use plant_sim::qemu::{self, Qemu};
 use plant_sim::report;
 use plant_sim::run::{self, Recording, Results};
@@ -87,6 +87,12 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     let config = args.config.config(&args.scenario)?;
     // Everything that can be refused is, before the folder is touched.
     config.rig().map_err(Failure::usage)?;
+    let results = run::results(&args.out);
+    let outputs = results.iter().chain(&args.mcap).map(PathBuf::as_path);
+    output::distinct(
+        args.config.inputs(&args.scenario),
+        outputs.chain(args.verdicts.paths()),
+    )?;
     let verdicts = args.verdicts.create()?;
     let mcap = args.mcap.as_deref();
     let mut mcap = mcap
@@ -161,6 +167,15 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
             results
         }
     }?;
+    let end = results.summary.sim_time_s;
+    for fault in &config.scenario.faults {
+        if fault.from.seconds() >= end {
+            say!(
+                "plant-sim: warning: the fault {} never came: the run ended at {end:.3} s",
+                fault.text
+            );
+        }
+    }
     if let Some(curves) = curves {
         keep_report(&config, &results, curves, &folder)?;
     }

@@ -9,7 +9,7 @@ use plant_sim::external::{histogram, measure};
 use plant_sim::output;
 use sim::scenario;
 
-use super::values::number;
+use super::values::{number, svg};
 use super::{Failure, show};
 
 /// Arguments of `timing`.
@@ -26,7 +26,7 @@ pub(super) struct TimingArgs {
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     seconds: u32,
     /// Where the histogram goes.
-    #[arg(long, value_name = "FILE", default_value = "timing.svg")]
+    #[arg(long, value_name = "FILE", default_value = "timing.svg", value_parser = svg)]
     svg: PathBuf,
 }
 

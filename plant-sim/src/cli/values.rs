@@ -9,7 +9,20 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
 
 /// Any whole number; what it may be is checked where it is used.
 pub(super) fn whole(text: &str) -> Result<i64, String> {
-    text.parse().map_err(|_| "allowed: a whole number".into())
+    let most = i64::MAX;
+    text.parse()
+        .map_err(|_| format!("allowed: a whole number up to {most}"))
+}
+
+/// A file for an SVG: under another picture's name no program would show it.
+pub(super) fn svg(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension() {
+        Some(other) if !other.eq_ignore_ascii_case("svg") => {
+            Err("the plot is an SVG; allowed: a name that ends in .svg".into())
+        }
+        _ => Ok(path),
+    }
 }
 
 /// The image of a controller.

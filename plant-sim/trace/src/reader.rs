@@ -18,6 +18,13 @@ use pcapng::Pcapng;
 
 /// Byte order mark of UTF-8, which editors on other systems prepend.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+/// First bytes of compressed files, and the program that reads them.
+const PACKED: [(&[u8], &str); 3] = [
+    (b"\xFD7zX", "xz"),
+    (b"BZh", "bzip2"),
+    (b"\x28\xB5\x2F\xFD", "zstd"),
+];
+
 /// First bytes of Vector BLF.
 const BLF: &[u8] = b"LOGG";
 /// Bytes that identify the format.
@@ -99,6 +106,14 @@ impl<R: BufRead> Reader<R> {
             return Err(io::Error::new(
                 io::ErrorKind::InvalidData,
                 "Vector BLF, which is not read; python-can converts it: python3 -m can.logconvert FILE.blf OUT.log",
+            ));
+        } else if let Some((_, program)) = PACKED.iter().find(|(magic, _)| bytes.starts_with(magic))
+        {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                format!(
+                    "compressed, and of that only .gz is read; unpack it: {program} -dc FILE | plant-sim trace ... -"
+                ),
             ));
         } else if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
             return Err(io::Error::new(

@@ -241,6 +241,23 @@ fn asc_of_other_tools_is_read() {
 }
 
 /// The microseconds below the millisecond of the header are in the first time.
+/// What is damaged is counted; events of other kinds are passed over.
+#[test]
+fn asc_lines_that_are_cut_or_before_the_start_are_not_dropped() {
+    let text = "base hex  timestamps absolute\n\
+        0.000000 Start of measurement\n\
+        0.000000 1  Statistic: D 0 R 0 XD 0 XR 0 E 0 O 0 B 0.00%\n\
+        0.100000 1  123             Rx   d 2 00 11\n\
+        -0.300000 1  125             Rx   d 2 00 11\n\
+        0.400000 1  126\n\
+        End TriggerBlock\n";
+    let read = read(text.as_bytes());
+    assert_eq!(read.len(), 3, "{read:?}");
+    assert!(read[0].is_ok());
+    let damaged = |line: &Result<Record, Problem>| matches!(line, Err(Problem::Asc(_)));
+    assert!(read[1..].iter().all(damaged), "{read:?}");
+}
+
 #[test]
 fn asc_loses_no_microsecond() {
     let records = log("(1720000000.000475) can0 123#00\n(1720000000.100475) can0 123#00\n");

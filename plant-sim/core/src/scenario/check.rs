@@ -57,8 +57,18 @@ impl Scenario {
         if self.cycle.is_empty() {
             findings.wrong("cycle", "empty", "at least one step");
         }
+        let mut moves = false;
         for (index, step) in self.cycle.iter().enumerate() {
-            findings.step(&format!("cycle[{index}]"), step);
+            let key = format!("cycle[{index}]");
+            findings.step(&key, step);
+            if let (Step::Stop(after), false) = (step, moves) {
+                findings.wrong(
+                    &format!("{key}.stop"),
+                    after,
+                    "after a move, which it stops",
+                );
+            }
+            moves |= matches!(step, Step::Jump(_) | Step::Line(_) | Step::Joints(_));
         }
         findings.requirements();
         findings.judge()

@@ -88,13 +88,25 @@ pub(super) fn for_people(message: &str) -> String {
 }
 
 /// Types as a person who writes TOML names them.
-const WORDS: [(&str, &str); 9] = [
+const WORDS: [(&str, &str); 12] = [
+    ("expected u32", "expected a whole number, 0 or more"),
     (
-        "expected u32",
-        "expected a whole number from 0 to 4294967295",
+        "expected u64",
+        "expected a whole number from 0 to 9223372036854775807",
     ),
-    ("expected u64", "expected a whole number, 0 or more"),
-    ("expected i8", "expected a whole number from -128 to 127"),
+    ("expected i8", "expected a whole number from -2 to 2"),
+    (
+        "wanted exactly 1 element, more than 1 element",
+        "expected one step, found several: each needs a [[cycle]] of its own",
+    ),
+    (
+        "wanted exactly 1 element, found 0 elements",
+        "expected a step, such as dwell = 0.1",
+    ),
+    (
+        "expected struct variant Step::Place",
+        "expected {}: a place has no values",
+    ),
     ("expected f64", "expected a number"),
     ("expected a sequence", "expected an array"),
     ("floating point `", "number `"),

@@ -1,5 +1,7 @@
 //! What to run with what: the options that change a scenario and choose robots.
 
+use std::path::Path;
+
 use clap::Args;
 use plant_sim::input;
 use plant_sim::say;
@@ -59,6 +61,12 @@ impl ConfigArgs {
     /// The robot as the controller knows it.
     pub(crate) fn nominal(&self) -> Result<RobotModel, Failure> {
         load(self.model.as_deref())
+    }
+
+    /// Files that are read, besides those that come with the program.
+    pub(crate) fn inputs<'a>(&'a self, scenario: &'a str) -> impl Iterator<Item = &'a Path> {
+        let models = self.model.iter().chain(&self.plant_model);
+        models.map(String::as_str).chain([scenario]).map(Path::new)
     }
 
     /// What to run with what, each value checked as if the scenario's file had it.

@@ -1,6 +1,6 @@
 //! What became of the requirements, for other programs: the options that name the files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use plant_sim::output::{self, File};
@@ -30,6 +30,11 @@ type Format = fn(&Results) -> String;
 pub(super) struct Files(Vec<(File, Format)>);
 
 impl VerdictArgs {
+    pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {
+        let paths = [&self.junit, &self.needs, &self.markdown];
+        paths.into_iter().flatten().map(PathBuf::as_path)
+    }
+
     pub(super) fn create(&self) -> Result<Files, Failure> {
         let wanted: [(&Option<PathBuf>, Format); 3] = [
             (&self.junit, junit),

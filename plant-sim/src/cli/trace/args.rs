@@ -11,7 +11,7 @@ use trace::convert::Target;
 use trace::select::{Ids, Moment, Selection};
 
 use crate::cli::bitrate::bit_timing;
-use crate::cli::values::number;
+use crate::cli::values::{number, svg};
 
 /// A trace, and a selection of its records.
 #[derive(Args)]
@@ -125,17 +125,6 @@ pub(crate) struct PlotArgs {
     /// Write to this file instead of standard output.
     #[arg(long, value_name = "FILE", value_parser = svg)]
     pub out: Option<PathBuf>,
-}
-
-/// A file for an SVG: under another picture's name no program would show it.
-fn svg(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension() {
-        Some(other) if !other.eq_ignore_ascii_case("svg") => {
-            Err("the plot is an SVG; allowed: a name that ends in .svg".into())
-        }
-        _ => Ok(path),
-    }
 }
 
 /// Arguments of `check`.

@@ -54,6 +54,12 @@ impl Asc {
                 };
                 self.event(self.start_us.saturating_add(self.now_us), rest)
             }
+            // CANoe has events from before its start; here times are not negative.
+            [time, ..]
+                if time.starts_with('-') && time[1..].starts_with(|c: char| c.is_ascii_digit()) =>
+            {
+                Some(Err(Problem::Asc("a time before the start")))
+            }
             _ => None,
         }
     }
@@ -84,6 +90,10 @@ impl Asc {
         let (id, way, rest) = match (fd, rest) {
             (true, [way, id, rest @ ..]) => (id, way, rest),
             (false, [id, way, rest @ ..]) => (id, way, rest),
+            // Other events have words that are no identifiers.
+            (false, [cut]) if self.id(cut).is_ok() => {
+                return Some(Err(Problem::Asc("nothing after the identifier")));
+            }
             _ => return None,
         };
         let direction = match *way {
