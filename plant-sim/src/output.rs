@@ -272,6 +272,10 @@ impl Folder {
         {
             return Err(taken(path, there.file_type(), "--out names a folder"));
         }
+        if let (Err(_), Ok(link)) = (fs::metadata(path), fs::symlink_metadata(path)) {
+            let hint = "it leads nowhere; --out names a folder";
+            return Err(taken(path, link.file_type(), hint));
+        }
         fs::create_dir_all(path).map_err(OutputError::at(path))?;
         let lock = fs::File::open(path).map_err(OutputError::at(path))?;
         match lock.try_lock() {

@@ -181,8 +181,33 @@ fn unknown_keys_are_warned_of_with_the_nearest_known_one() {
 }
 
 #[test]
+fn efforts_that_do_not_fit_each_other_are_warned_of() {
+    for (from, to, expected) in [
+        (
+            r#""effort_peak": [640.0"#,
+            r#""effort_peak": [640000.0"#,
+            "joint_limits.effort_peak[0] is 640000, but the motor of the shoulder gives 640.0 through its gear",
+        ),
+        (
+            r#""viscous": [4.0"#,
+            r#""viscous": [4000.0"#,
+            "of the shoulder at full speed, more than its peak, 640",
+        ),
+    ] {
+        let (_, warnings) = RobotModel::from_json(&edited(from, to)).unwrap();
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        assert!(warnings[0].ends_with(expected), "{warnings:?}");
+    }
+}
+
+#[test]
 fn physics_that_no_robot_has_is_refused() {
     for (from, to, expected) in [
+        (
+            r#""coulomb_tanh_eps": [0.01"#,
+            r#""coulomb_tanh_eps": [10"#,
+            "drive.coulomb_tanh_eps[0] is 10; it must be at most the axis' speed limit",
+        ),
         // Moments of inertia that no body has.
         (
             r#""inertia_com_diag": [0.053, 0.53, 0.55]"#,

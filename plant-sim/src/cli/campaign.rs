@@ -20,6 +20,7 @@ use sim::controller::InProcess;
 use sim::curves::Curves;
 use sim::summary::Collector;
 
+use super::values::count;
 use super::{Failure, show};
 
 /// Subcommands of `campaign`.
@@ -48,7 +49,7 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "FILE")]
     cases: Option<PathBuf>,
     /// Draw this many cases at random instead of all.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count)]
     count: Option<NonZero<u32>>,
     /// Seed of the draw.
     #[arg(long, value_name = "N", default_value_t = 0, requires = "count")]
@@ -65,8 +66,8 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "K/N|N")]
     shard: Option<String>,
     /// Threads; as many as the machine has cores if left out.
-    #[arg(long, value_name = "N")]
-    jobs: Option<NonZero<usize>>,
+    #[arg(long, value_name = "N", value_parser = count)]
+    jobs: Option<NonZero<u32>>,
     /// Keep the results that are there, and go on after them.
     #[arg(long)]
     resume: bool,
@@ -123,7 +124,11 @@ pub(super) fn run(command: &CampaignCommand) -> Result<(), Failure> {
     match command {
         CampaignCommand::Plan(args) => plan(args),
         CampaignCommand::Run(args) => work(args),
-        CampaignCommand::Merge(args) => Ok(merge::merge(&args.folders, &mut output())?),
+        CampaignCommand::Merge(args) => {
+            // Twice, so that nothing is written of results that do not belong together.
+            merge::merge(&args.folders, &mut io::sink())?;
+            Ok(merge::merge(&args.folders, &mut output())?)
+        }
         CampaignCommand::Report(args) => report(&args.results),
         CampaignCommand::Missing(args) => show(&(merge::missing(&args.folders)? + "\n")),
         CampaignCommand::Replay(args) => replay(args),
@@ -159,8 +164,10 @@ fn plan(args: &PlanArgs) -> Result<(), Failure> {
 
 fn work(args: &RunArgs) -> Result<(), Failure> {
     let shard = shard(args.shard.as_deref(), |name| env::var(name).ok()).map_err(Failure::usage)?;
-    let jobs = args.jobs.map_or_else(thread::available_parallelism, Ok);
-    let jobs = jobs.unwrap_or(NonZero::<usize>::MIN);
+    let jobs = match args.jobs {
+        Some(jobs) => NonZero::try_from(jobs).unwrap_or(NonZero::<usize>::MAX),
+        None => thread::available_parallelism().unwrap_or(NonZero::<usize>::MIN),
+    };
     let plan = Plan::open(&args.plan)?;
     let done = work::work(&plan, shard, jobs, args.resume, &args.out)?;
     if done.missed > 0 {
@@ -206,6 +213,12 @@ fn shard(given: Option<&str>, variable: impl Fn(&str) -> Option<String>) -> Resu
 }
 
 fn report(path: &Path) -> Result<(), Failure> {
+    if path.is_dir() {
+        return Err(Failure::usage(format!(
+            "{0} is a folder of results; merge them first: plant-sim campaign merge {0} | plant-sim campaign report -",
+            path.display()
+        )));
+    }
     let tally = if path == Path::new("-") {
         merge::tally(Path::new("standard input"), io::stdin().lock())?
     } else {

@@ -67,6 +67,7 @@ enum Command {
     /// Show a run, or a bus, on a page in the browser while it lives, and take part in it.
     View(view::ViewArgs),
     /// Write the page that runs the simulation in a browser.
+    #[command(alias = "whatif")]
     WhatIf(what_if::WhatIfArgs),
     /// Inspect a recorded trace.
     #[command(subcommand)]

@@ -1,5 +1,6 @@
 //! Values that several subcommands take.
 
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 /// Any number; what it may be is checked where it is used.
@@ -12,6 +13,13 @@ pub(super) fn whole(text: &str) -> Result<i64, String> {
     let most = i64::MAX;
     text.parse()
         .map_err(|_| format!("allowed: a whole number up to {most}"))
+}
+
+/// How many of something there are to be.
+pub(super) fn count(text: &str) -> Result<NonZero<u32>, String> {
+    let most = u32::MAX;
+    text.parse()
+        .map_err(|_| format!("allowed: a whole number from 1 to {most}"))
 }
 
 /// A file for an SVG: under another picture's name no program would show it.

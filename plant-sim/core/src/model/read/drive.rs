@@ -49,8 +49,50 @@ pub(super) fn drive(
         drive.motor_torque_limit,
         |rated, peak| (rated > peak).then(|| format!("at most the motor's limit, {peak} N m")),
     )?;
+    each(
+        node,
+        "coulomb_tanh_eps",
+        drive.coulomb_eps,
+        limits.velocity,
+        |eps, speed| {
+            (eps > speed).then(|| format!("at most the axis' speed limit, {speed}: it is the speed over which friction builds up"))
+        },
+    )?;
     check_encoder(node, &drive, limits)?;
+    warn_of_efforts(node, &drive, limits, warnings);
     Ok(drive)
+}
+
+/// Efforts that do not fit each other: a unit or a power of ten is wrong.
+fn warn_of_efforts(
+    node: &Node<'_>,
+    drive: &DriveTrain,
+    limits: &JointLimits,
+    warnings: &mut Vec<String>,
+) {
+    /// Data sheets are rounded.
+    const ROUNDING: f64 = 1.05;
+    for (axis, name) in AXES.into_iter().enumerate() {
+        let lead = if axis == 2 {
+            TAU / drive.screw_lead
+        } else {
+            1.0
+        };
+        let given = drive.motor_torque_limit[axis] * drive.gear_ratio[axis] * lead;
+        let peak = limits.effort[axis];
+        if peak > given * ROUNDING {
+            warnings.push(format!(
+                "joint_limits.effort_peak[{axis}] is {peak}, but the motor of the {name} gives {given:.1} through its gear"
+            ));
+        }
+        let friction = drive.coulomb[axis] + drive.viscous[axis] * limits.velocity[axis];
+        if friction > peak {
+            warnings.push(format!(
+                "{}.viscous[{axis}] and coulomb[{axis}] take {friction:.1} of the {name} at full speed, more than its peak, {peak}",
+                node.path()
+            ));
+        }
+    }
 }
 
 /// Motor positions are sent as 32-bit counts: these must cover twice the range of every axis.
