@@ -87,7 +87,13 @@ fn a_log_without_anything_to_judge_has_an_exit_code_of_its_own() {
     let (code, output, messages) = trace("unselected", FOREIGN, &["decode", "--id", "7FF"]);
     assert_eq!((code, output.as_str()), (3, ""));
     assert!(
-        messages.contains("none of 3 records is selected"),
+        messages.contains("none of 3 records is selected; they are of can0 and from "),
+        "{messages}"
+    );
+    let backwards = ["decode", "--from", "5", "--to", "1"];
+    let (code, _, messages) = trace("backwards", FOREIGN, &backwards);
+    assert!(
+        code == 2 && messages.contains("--to is before --from"),
         "{messages}"
     );
 }

@@ -21,6 +21,16 @@ pub struct Selection {
 }
 
 impl Selection {
+    /// Whether no time can be selected, since the latest is before the earliest.
+    #[must_use]
+    pub fn is_backwards(&self) -> bool {
+        match (self.from, self.to) {
+            (Some(Moment::Absolute(from)), Some(Moment::Absolute(to)))
+            | (Some(Moment::Relative(from)), Some(Moment::Relative(to))) => to < from,
+            _ => false,
+        }
+    }
+
     /// Whether the record's interface is selected.
     #[must_use]
     pub fn interface(&self, record: &Record) -> bool {

@@ -1,6 +1,7 @@
 //! A trace as input: file or standard input, with progress, and bad lines reported.
 
 use std::cell::Cell;
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::os::fd::AsFd;
@@ -12,7 +13,7 @@ use flate2::read::MultiGzDecoder;
 use plant_sim::{interrupt, say};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use trace::select::Selection;
-use trace::{Problem, ReadError, Reader, Record};
+use trace::{Interface, Problem, ReadError, Reader, Record};
 
 use crate::cli::Failure;
 
@@ -35,7 +36,9 @@ pub(super) struct Source {
     /// Bytes read, and the total if known.
     bytes: Rc<Cell<u64>>,
     size: Option<u64>,
-    first_us: Option<u64>,
+    /// Times of the first record and of the last one.
+    span_us: Option<(u64, u64)>,
+    interfaces: BTreeSet<Interface>,
     records: u64,
     selected: u64,
     unreadable: u64,
@@ -71,6 +74,11 @@ impl Read for Counted {
 
 impl Source {
     pub(super) fn open(path: &Path, selection: Selection) -> Result<Self, Failure> {
+        if selection.is_backwards() {
+            return Err(Failure::usage(
+                "--to is before --from; allowed: a later time",
+            ));
+        }
         let mut name = path.display().to_string();
         let failed =
             |error: io::Error| Failure::usage(format!("cannot read {}: {error}", path.display()));
@@ -108,7 +116,8 @@ impl Source {
             selection,
             bytes,
             size: Some(data.len()).filter(|&size| size > 0),
-            first_us: None,
+            span_us: None,
+            interfaces: BTreeSet::new(),
             records: 0,
             selected: 0,
             unreadable: 0,
@@ -124,7 +133,9 @@ impl Source {
             match self.reader.next()? {
                 Ok(record) => {
                     self.records += 1;
-                    self.first_us.get_or_insert(record.time_us);
+                    let (first, _) = self.span_us.unwrap_or((record.time_us, 0));
+                    self.span_us = Some((first, record.time_us));
+                    self.interfaces.insert(record.interface);
                     if self.selection.interface(&record) {
                         self.selected += u64::from(self.counts(&record));
                         return Some(Ok(record));
@@ -173,7 +184,7 @@ impl Source {
 
     /// Whether the record's identifier and time are selected.
     pub(super) fn counts(&self, record: &Record) -> bool {
-        let first_us = self.first_us.unwrap_or(record.time_us);
+        let first_us = self.span_us.map_or(record.time_us, |(first, _)| first);
         self.selection.id(record) && self.selection.time(record, first_us)
     }
 
@@ -206,9 +217,17 @@ impl Source {
     pub(super) fn nothing(&self, what: &str) -> Failure {
         let name = &self.name;
         match (self.selected, self.records) {
-            (0, records @ 1..) => Failure::nothing_judged(format!(
-                "{name}: nothing judged: none of {records} records is selected"
-            )),
+            (0, records @ 1..) => {
+                let (first, last) = self.span_us.unwrap_or_default();
+                let interfaces: Vec<String> =
+                    self.interfaces.iter().map(Interface::to_string).collect();
+                Failure::nothing_judged(format!(
+                    "{name}: nothing judged: none of {records} records is selected; they are of {} and from {} to {} s",
+                    interfaces.join(", "),
+                    seconds(first),
+                    seconds(last),
+                ))
+            }
             _ => Failure::nothing_judged(format!("{name}: nothing judged: {what}")),
         }
     }
@@ -232,4 +251,9 @@ pub(super) fn input(path: &Path) -> io::Result<File> {
     } else {
         File::open(path)
     }
+}
+
+/// Seconds as in the trace: a double has too few digits for microseconds since 1970.
+fn seconds(time_us: u64) -> String {
+    format!("{}.{:06}", time_us / 1_000_000, time_us % 1_000_000)
 }
