@@ -272,7 +272,7 @@ fn judge(fault: &str, payload: f64, defect: Option<Defect>) -> Verdict {
 }
 
 /// A small campaign: every kind of detection and reaction once.
-const CASES: [(&str, f64); 11] = [
+const CASES: [(&str, f64); 12] = [
     ("none", 2.0),
     ("feedback:loss@0.45s..0.452s", 2.0),
     ("feedback:corrupt@0.45s..0.452s", 2.0),
@@ -284,6 +284,7 @@ const CASES: [(&str, f64); 11] = [
     ("encoder:elbow:jump=0.5@0.45s", 22.0),
     ("motor:elbow:dead@0.4s", 2.0),
     ("drives:silent@0.45s", 22.0),
+    ("brake:stuck@0.45s", 22.0),
 ];
 
 fn missed(defect: Option<Defect>) -> BTreeSet<Requirement> {

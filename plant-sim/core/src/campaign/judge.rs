@@ -14,6 +14,7 @@ use super::bounds::{Bounds, SAMPLES_TO_REPORT, STANDING};
 use super::expect::{Expected, expected, lateness, stops_under_control};
 use super::lift::Lift;
 use super::verdict::{Requirement, Verdict};
+use crate::faults::What;
 use crate::maths::square;
 use crate::observer::{Observer, PlantState, Truth};
 use crate::setup::RunConfig;
@@ -40,6 +41,8 @@ pub struct Judge {
     /// Beginning of the first fault; the end of time without one.
     onset: Instant,
     expected: Expected,
+    /// Whether the brake may stay open, where torque has to go on holding the lift.
+    torque_holds: bool,
     /// Longest time from a report to the last command that does not know of it.
     reaction: Duration,
     missed: BTreeSet<Requirement>,
@@ -86,6 +89,10 @@ impl Judge {
             bounds: Bounds::new(&config.actual, period.duration().seconds()),
             onset: onset.unwrap_or(Instant::MAX),
             expected: expected(&scenario.faults, period),
+            torque_holds: scenario
+                .faults
+                .iter()
+                .any(|fault| fault.what == What::BrakeStuck),
             reaction: period.duration() + lateness(&scenario.faults, period),
             missed: BTreeSet::new(),
             control: ControlWord::EMPTY,
@@ -143,6 +150,7 @@ impl Judge {
         let end = self.last.map_or(0.0, |last| last.t);
         let is_commanded = end - self.commanded.seconds() < 5.0 * self.period.duration().seconds();
         if self.report.is_some()
+            && !self.torque_holds
             && is_commanded
             && self.control.contains(ControlWord::TORQUE_ENABLE)
         {
@@ -261,6 +269,9 @@ impl Judge {
                 return;
             }
             if now.time - detected.time > self.bounds.torque_off_s() {
+                if self.torque_holds {
+                    return;
+                }
                 self.miss(Requirement::Standstill);
             }
             if self.driven > self.fastest * self.bounds.stop_s() {
