@@ -1,9 +1,9 @@
 //! One sample of control: states, motion, control laws, limits and faults.
 //!
-//! [`controller`] joins the parts; each of the others is pure: [`states`] the states, [`laws`] the control laws,
-//! [`readings`] what the drives report, [`limits`] what a motor can give, [`monitor`] what counts as a fault, [`fault`] the reaction to it, [`setup`] what
-//! can be changed at run time. [`phase`] is the probe that measures what each part costs. Depends on
-//! [`mechanics`](crate::mechanics) and [`trajectory`](crate::trajectory).
+//! [`controller`] joins the parts; each of the others is pure: [`readings`] what the drives report, [`states`] the
+//! states, [`laws`] the control laws, [`limits`] what a motor can give, [`monitor`] what counts as a fault, [`fault`] the
+//! reaction to it, [`setup`] what can be changed at run time. [`phase`] is the probe that measures what each part costs.
+//! Depends on [`mechanics`](crate::mechanics) and [`trajectory`](crate::trajectory).
 
 /// Declares an enumeration and the list of its variants together, so that the list cannot miss one.
 macro_rules! listed {
