@@ -47,9 +47,8 @@ impl<W: Write> Recorder<W> {
     /// Those of the sink.
     pub fn new(sink: W, model: &RobotModel) -> io::Result<Self> {
         let options = WriteOptions::new()
-            .compression(Some(Compression::Zstd))
-            // By default as many as there are cores; the bytes must not depend on that.
-            .compression_threads(0)
+            // A third more bytes than with zstd, whose library takes half a minute to compile; every first run would pay that.
+            .compression(Some(Compression::Lz4))
             .disable_seeking(true)
             .library(concat!("plant-sim ", env!("CARGO_PKG_VERSION")));
         let arm = ArmModel::from(model);
