@@ -112,6 +112,18 @@ pub enum EvalError {
         /// Largest number that the implementation can represent.
         max: f64,
     },
+    /// A length in another unit.
+    #[error("line {line}, column {column}: found {found:?}; {slip}")]
+    Unit {
+        /// Line of the row.
+        line: usize,
+        /// Name of the column.
+        column: String,
+        /// Content of the cell.
+        found: String,
+        /// What it is in the unit that is read.
+        slip: String,
+    },
     /// A row longer than the header.
     #[error("line {line}: {found} values; allowed: the header's {allowed}")]
     TooManyValues {

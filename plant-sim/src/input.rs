@@ -1,10 +1,14 @@
 //! Inputs named on the command line: scenarios, robots, payloads.
 
-use std::io;
+use std::fs::File;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use sim::model::{self, ModelError, Payload, RobotModel};
 use sim::scenario::{self, Change, Scenario, ScenarioError};
+
+/// No file that a person writes has as many bytes. A device may never end.
+const MOST: u64 = 64 << 20;
 
 /// Why an input cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -35,6 +39,16 @@ pub enum InputError {
         /// Reason.
         source: io::Error,
     },
+    /// The file is of the other kind.
+    #[error("{}: it is {found}; {hint}", path.display())]
+    Kind {
+        /// File.
+        path: PathBuf,
+        /// What it looks like.
+        found: &'static str,
+        /// What belongs there, and where this belongs.
+        hint: &'static str,
+    },
     /// The scenario is wrong.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
@@ -58,8 +72,15 @@ pub fn scenario(name: &str, changes: &[Change]) -> Result<Scenario, InputError> 
         None if !Path::new(name).exists() => {
             return Err(InputError::NoScenario { name: name.into() });
         }
-        None => self::text(Path::new(name))?,
+        None => self::text(Path::new(name)).map_err(unread(name.as_ref()))?,
     };
+    if is_json(&text) {
+        return Err(InputError::Kind {
+            path: name.into(),
+            found: "JSON, like the model of a robot",
+            hint: "a scenario is TOML; --model and --plant-model take models",
+        });
+    }
     Ok(Scenario::parse_with(&text, name, changes)?)
 }
 
@@ -76,7 +97,7 @@ pub fn robot(name: &str) -> Result<(RobotModel, Vec<String>), InputError> {
         return Err(InputError::NoRobot { name: name.into() });
     }
     let (mut model, warnings) =
-        RobotModel::from_json(&text(path)?).map_err(|source| in_file(path, source))?;
+        RobotModel::from_json(&json(path)?).map_err(|source| in_file(path, source))?;
     model.source.origin = name.into();
     Ok((model, warnings))
 }
@@ -86,28 +107,61 @@ pub fn robot(name: &str) -> Result<(RobotModel, Vec<String>), InputError> {
 /// # Errors
 /// See [`InputError`].
 pub fn payload(path: &Path) -> Result<Payload, InputError> {
-    Payload::from_json(&text(path)?).map_err(|source| in_file(path, source))
+    Payload::from_json(&json(path)?).map_err(|source| in_file(path, source))
 }
 
-/// The text of a file, without the mark that some editors put before UTF-8.
-fn text(path: &Path) -> Result<String, InputError> {
-    std::fs::read(path)
-        .and_then(|bytes| {
-            let wrong = |what| io::Error::new(io::ErrorKind::InvalidData, what);
-            if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
-                return Err(wrong("it is UTF-16; save it as UTF-8"));
-            }
-            let text = String::from_utf8(bytes)
-                .map_err(|_| wrong("it is no text; allowed: text in UTF-8"))?;
-            Ok(text
-                .strip_prefix('\u{FEFF}')
-                .map(str::to_owned)
-                .unwrap_or(text))
-        })
-        .map_err(|source| InputError::Read {
+fn is_json(text: &str) -> bool {
+    serde_json::from_str::<serde_json::Map<String, serde_json::Value>>(text).is_ok()
+}
+
+/// The text of a file that has to be JSON.
+fn json(path: &Path) -> Result<String, InputError> {
+    let text = text(path).map_err(unread(path))?;
+    let is_json = serde_json::from_str::<serde_json::Value>(&text).is_ok();
+    if !is_json && !text.trim().is_empty() && toml::from_str::<toml::Table>(&text).is_ok() {
+        return Err(InputError::Kind {
             path: path.into(),
-            source,
-        })
+            found: "TOML, like a scenario",
+            hint: "models and payloads are JSON; run, check and view take scenarios",
+        });
+    }
+    Ok(text)
+}
+
+/// The text of a file that a person writes, without the mark that some editors put before UTF-8.
+///
+/// # Errors
+/// It cannot be read, or is no such text.
+pub(crate) fn text(path: &Path) -> io::Result<String> {
+    let wrong = |what| Err(io::Error::new(io::ErrorKind::InvalidData, what));
+    if path.is_dir() {
+        return wrong("it is a folder; name a file in it");
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MOST).read_to_end(&mut bytes)?;
+    if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
+        return wrong("it is UTF-16; save it as UTF-8");
+    }
+    if bytes.len() as u64 == MOST {
+        return wrong("it has more than 64 MiB, and no such file has");
+    }
+    if bytes.contains(&0) {
+        return wrong("it holds zero bytes, as UTF-16 and programs do; allowed: text in UTF-8");
+    }
+    let Ok(text) = String::from_utf8(bytes) else {
+        return wrong("it is no text; allowed: text in UTF-8");
+    };
+    Ok(text
+        .strip_prefix('\u{FEFF}')
+        .map(str::to_owned)
+        .unwrap_or(text))
+}
+
+fn unread(path: &Path) -> impl FnOnce(io::Error) -> InputError {
+    |source| InputError::Read {
+        path: path.into(),
+        source,
+    }
 }
 
 fn in_file(path: &Path, source: ModelError) -> InputError {
@@ -136,8 +190,42 @@ mod tests {
         )
         .unwrap();
         assert!(robot(name).unwrap_err().to_string().contains("UTF-16"));
+        std::fs::write(&file, b"{\0\"\0").unwrap();
+        assert!(robot(name).unwrap_err().to_string().contains("zero bytes"));
         std::fs::write(&file, b"\x80").unwrap();
         assert!(robot(name).unwrap_err().to_string().contains("UTF-8"));
+    }
+
+    #[test]
+    fn files_of_the_other_kind_are_named_as_such() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = |name: &str, text: &str| {
+            let file = folder.path().join(name);
+            std::fs::write(&file, text).unwrap();
+            file.to_str().unwrap().to_owned()
+        };
+        let model = name("a", include_str!("../models/irb930-22-1.05.json"));
+        let toml = name("b", include_str!("../scenarios/gate.toml"));
+        let refused = [
+            (scenario(&model, &[]).map(drop), "JSON, like the model"),
+            (robot(&toml).map(drop), "TOML, like a scenario"),
+            (payload(toml.as_ref()).map(drop), "TOML, like a scenario"),
+            (robot("/").map(drop), "it is a folder"),
+            (scenario("/dev/zero", &[]).map(drop), "64 MiB"),
+            // What is neither is not taken for one of them.
+            (robot(&name("c", "{ \"a\": ")).map(drop), "not JSON"),
+            (robot(&name("d", "")).map(drop), "not JSON"),
+            // A document of either kind.
+            (
+                robot(&name("f", "[1]")).map(drop),
+                "the document is an array",
+            ),
+            (scenario(&name("e", ""), &[]).map(drop), "missing field"),
+        ];
+        for (result, words) in refused {
+            let message = result.unwrap_err().to_string();
+            assert!(message.contains(words), "{words}: {message}");
+        }
     }
 
     #[test]

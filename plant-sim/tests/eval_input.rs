@@ -58,6 +58,34 @@ fn labels_are_optional() {
 }
 
 #[test]
+fn lengths_that_can_only_be_millimetres_are_named_as_such() {
+    let joints = |lift: f64| {
+        run(
+            Table::Kinematics,
+            By::Lagrange,
+            &format!("q1,q2,q3,q4,qd1,qd2,qd3,qd4\n0,0,{lift},0,0,0,0,0\n"),
+        )
+    };
+    let message = refusal("x,y,z,yaw\n0.6,0.1,-0.2,0\n600,0.1,-0.2,0\n");
+    assert!(
+        message.contains("line 3, column x") && message.contains("600 mm is 0.6"),
+        "{message}"
+    );
+    assert!(refusal("x,y,z,yaw\n0.6,0.1,-200,0\n").contains("-200 mm is -0.2"));
+    let message = joints(150.0).unwrap_err();
+    assert!(
+        message.contains("column q3") && message.contains("150 mm is 0.15"),
+        "{message}"
+    );
+    // Out of reach, and no number of millimetres either; an angle is none.
+    for (far, lift) in [("9", 0.15), ("1e9", 9.0)] {
+        let output = run(Table::Ik, By::Plant, &format!("x,y,z,yaw\n{far},0,0,90\n"));
+        assert!(output.unwrap().contains("too_far"), "{far}");
+        assert!(joints(lift).is_ok(), "{lift}");
+    }
+}
+
+#[test]
 fn an_input_without_rows_gives_a_header() {
     assert_eq!(
         run(Table::Ik, By::Plant, "x,y,z,yaw\n")

@@ -52,12 +52,13 @@ impl Allowed {
         })
     }
 
+    /// What the controller's numbers do not tell from zero is not above it.
     fn admits(self, number: f64) -> bool {
-        (self.low..=self.high).contains(&number) && !(self.above && number == self.low)
+        (self.low..=self.high).contains(&number) && !(self.above && number as f32 <= 0.0)
     }
 
     /// The mistaken unit that would explain a number, if any: millimetres or degrees.
-    fn slip(self, number: f64) -> Option<String> {
+    pub(crate) fn slip(self, number: f64) -> Option<String> {
         match self.unit {
             "m" if self.admits(number / 1000.0) && number.abs() >= 10.0 => Some(format!(
                 "lengths are in m: {number} mm is {}",
@@ -96,6 +97,17 @@ pub(crate) const PAYLOAD_MASS: Allowed = Allowed::within(0.0, 100.0, "kg");
 pub(crate) const PAYLOAD_COM: Allowed = Allowed::within(-1.0, 1.0, "m");
 /// Moments of inertia of a payload, as limited by the message.
 pub(crate) const PAYLOAD_INERTIA: Allowed = Allowed::within(0.0, 10.0, "kg m2");
+
+/// Checks that a payload with inertia has mass.
+///
+/// # Errors
+/// What is allowed for the moments of inertia.
+pub(crate) fn check_mass(mass: f64, moments: [f64; 3]) -> Result<(), &'static str> {
+    if mass == 0.0 && moments != [0.0; 3] {
+        return Err("zeros, since it weighs nothing");
+    }
+    Ok(())
+}
 
 /// Checks principal moments of inertia against the triangle inequality: no body has one greater than the sum of the
 /// other two.

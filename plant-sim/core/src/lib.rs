@@ -66,5 +66,5 @@ pub mod scenario;
 pub mod selection;
 pub mod setup;
 pub mod summary;
-mod text;
+pub mod text;
 pub mod world;

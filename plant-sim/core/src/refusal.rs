@@ -21,15 +21,27 @@ pub(crate) fn sentence(request: &MotionRequest, refusal: &Refusal) -> String {
         (Some("top"), Some(unit)) if value < 0.0 => {
             text += &format!(
                 "; parameter top is {} {unit} below the start or the end of the jump, allowed: not below either",
-                -value
+                rounded(-value)
             );
         }
         (parameter, Some(unit)) => {
             let parameter =
                 parameter.map_or_else(String::new, |name| format!("parameter {name}: "));
             let space = if unit.is_empty() { "" } else { " " };
-            text += &format!("; {parameter}{value}{space}{unit}, limit {limit}{space}{unit}");
+            text += &format!(
+                "; {parameter}{}{space}{unit}, limit {}{space}{unit}",
+                rounded(value),
+                rounded(limit)
+            );
         }
+    }
+    if let Some(z) = height(request, refusal) {
+        // The flange goes down as the lift goes up its axis.
+        text += &format!(
+            " (z {} m, limit {} m)",
+            rounded(z),
+            rounded(z + value - limit)
+        );
     }
     if refusal.reason == RefusalReason::JointLimit
         && let Some(posture) = request.posture()
@@ -37,6 +49,27 @@ pub(crate) fn sentence(request: &MotionRequest, refusal: &Refusal) -> String {
         text += &asked(posture);
     }
     text
+}
+
+/// A number without the digits that single precision does not have.
+fn rounded(value: f32) -> f64 {
+    let value = f64::from(value);
+    let micro = (value * 1e6).round() / 1e6;
+    // Of small gains and sines every digit counts.
+    if value.abs() < 1e-3 { value } else { micro }
+}
+
+/// Height of the pose that the lift cannot reach, if it is one.
+fn height(request: &MotionRequest, refusal: &Refusal) -> Option<f32> {
+    if refusal.reason != RefusalReason::JointLimit || refusal.axis != 2 {
+        return None;
+    }
+    match request {
+        MotionRequest::MoveLine { target, .. } => Some(target[2]),
+        MotionRequest::Jump { target, .. } if refusal.value > refusal.limit => Some(target[2]),
+        MotionRequest::Jump { top, .. } => Some(*top),
+        _ => None,
+    }
 }
 
 /// The posture that was asked for, and so may be what is in the way.
@@ -132,6 +165,15 @@ mod tests {
             jump(RefusalReason::JointLimit, 1, 2.75, 2.5),
             "An axis would leave its range; axis elbow; parameter to: 2.75 rad, limit 2.5 rad, \
              in turn -1 of the wrist"
+        );
+        // 78.7 mm lower than the lowest that the lift reaches, and higher than the highest.
+        assert_eq!(
+            jump(RefusalReason::JointLimit, 2, 0.378_700_02, 0.3),
+            "An axis would leave its range; axis lift; parameter to or top: 0.3787 m, limit 0.3 m (z -0.2 m, limit -0.1213 m), \
+             in turn -1 of the wrist"
+        );
+        assert!(
+            jump(RefusalReason::JointLimit, 2, -0.1, 0.0).contains("(z -0.25 m, limit -0.35 m)")
         );
         assert_eq!(
             jump(RefusalReason::OutOfRange, Refusal::NO_AXIS, -0.5, 0.0),

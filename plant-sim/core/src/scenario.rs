@@ -19,6 +19,7 @@ use crate::model::Payload;
 use crate::selection::LawChoice;
 
 pub use change::Change;
+pub use check::millimetres;
 use error::for_people;
 pub use error::{Place, ScenarioError};
 pub use library::{built_in, instead_of, names};

@@ -184,6 +184,12 @@ fn start(scenario: &Scenario, robot: &RobotModel) -> Result<[f64; 4], SetupError
                 return Ok(asked.q.into());
             };
             let mut why = out_of_range(violation, robot, &asked.q);
+            if let Violation::TooHigh | Violation::TooLow = violation {
+                // The flange goes down as the lift goes up its axis.
+                let limits = [robot.limits.upper[2], robot.limits.lower[2]];
+                let [low, high] = limits.map(|limit| z + asked.q[2] - limit);
+                why += &format!(", which is z from {low:.6} to {high:.6} m");
+            }
             if let (Violation::Wrist, Some(turn)) = (violation, turn) {
                 why += &format!(", in start_turn = {turn}");
             }

@@ -9,6 +9,9 @@ pub struct Source {
     pub text: String,
 }
 
+/// What a name may hold: it is shown on terminals, which obey control characters.
+pub(crate) const IN_A_NAME: &str = "a text without control characters";
+
 /// Line and column of a byte in `text`, counted from 1; columns count characters.
 pub(crate) fn place(text: &str, at: usize) -> (usize, usize) {
     let before = text.get(..at).unwrap_or(text);
@@ -18,7 +21,7 @@ pub(crate) fn place(text: &str, at: usize) -> (usize, usize) {
 }
 
 /// The known word most likely meant, if one is near enough.
-pub(crate) fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     known
         .map(|known| (strsim::jaro_winkler(word, known), known))
         .filter(|(likeness, _)| *likeness > 0.8)

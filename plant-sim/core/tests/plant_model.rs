@@ -259,6 +259,31 @@ fn physics_that_no_robot_has_is_refused() {
             r#""motor_max_speed_rad_s": [6283"#,
             "drive.motor_max_speed_rad_s[0] is 6283; it must be a number > 0, at most 1600 rad/s",
         ),
+        (
+            r#""acceleration_cap": [60.0"#,
+            r#""acceleration_cap": [1e7"#,
+            "joint_limits.acceleration_cap[0] is 10000000; it must be a number > 0, at most 100000 rad/s2",
+        ),
+        (
+            r#""rotor_inertia_motor_side": [0.000384"#,
+            r#""rotor_inertia_motor_side": [3.84"#,
+            "drive.rotor_inertia_motor_side[0] is 3.84; it must be a number >= 0, at most 1 kg m2",
+        ),
+        (
+            r#""a1": 0.56"#,
+            r#""a1": 1e-300"#,
+            "dh.a1 is 1e-300; it must be a number > 0, at most 10 m",
+        ),
+        (
+            "IRB 930",
+            r"\u001b[31m",
+            "it must be a text without control characters",
+        ),
+        (
+            r#""rated": 10.0"#,
+            r#""rated": 23.0"#,
+            "payload_rated_max_kg.rated is 23; it must be at most the heaviest payload, 22 kg",
+        ),
         (": 131072", ": 1", "it must be a whole number from 256"),
         // 2^26 counts x 33.3 turns to the limit are more than 32 bits.
         (
@@ -344,6 +369,10 @@ fn payloads_of_no_body_are_refused() {
         (
             r#"{"mass": 2, "com_flange_frame": [0, 0, 0.05], "inertia_com_diag": [0, 0, 1]}"#,
             "inertia_com_diag[2] is 1; it must be at most the sum of the other two moments, 0",
+        ),
+        (
+            r#"{"mass": 0, "com_flange_frame": [0, 0, 0.05], "inertia_com_diag": [1, 1, 1]}"#,
+            "inertia_com_diag is an array of 3; it must be zeros, since it weighs nothing",
         ),
         (
             r#"{"mass": 2, "com_flange_frame": [0, 0, 50], "inertia_com_diag": [0, 0, 0]}"#,

@@ -65,6 +65,7 @@ fn documents() -> [(Value, Value, Reader); 3] {
     let body = json!({ "mass": 2.0, "com_flange_frame": [0.0, 0.0, 0.05], "inertia_com_diag": [0.008, 0.008, 0.01] });
     let mut nothing = body.clone();
     nothing["mass"] = json!(0.0);
+    nothing["inertia_com_diag"] = json!([0.0, 0.0, 0.0]);
     let to = [0.6, 0.1, -0.2, 0.5];
     let work = json!({
         "name": "all", "about": "everything", "ends": "stopped", "faults": ["encoder:elbow:stuck@0.3s"], "seed": 1, "cycles": 1, "rate_hz": 2000.0, "law": "computed-torque:observer", "start": [0.5, 0.1, -0.2, 0.0], "start_elbow": "positive", "start_turn": 0,

@@ -1,5 +1,7 @@
 //! Columns of each table, and their positions in an input.
 
+use sim::scenario::millimetres;
+
 use super::{EvalError, Table};
 
 impl Table {
@@ -9,6 +11,14 @@ impl Table {
             Self::Kinematics => numbered(&["q", "qd"], 4),
             Self::Ik => ["x", "y", "z", "yaw"].map(str::to_owned).into(),
             Self::Dynamics | Self::Actuation => numbered(&["q", "qd", "qdd"], 4),
+        }
+    }
+
+    /// Those of them that are lengths.
+    fn lengths(self) -> &'static [&'static str] {
+        match self {
+            Self::Kinematics | Self::Dynamics | Self::Actuation => &["q3"],
+            Self::Ik => &["x", "y", "z"],
         }
     }
 
@@ -88,6 +98,7 @@ pub(super) struct Layout {
     inputs: Vec<usize>,
     /// Columns to pass on.
     pub(super) labels: Vec<usize>,
+    lengths: &'static [&'static str],
     largest: f64,
 }
 
@@ -119,6 +130,7 @@ impl Layout {
         Ok(Self {
             inputs: inputs.collect::<Result<_, _>>()?,
             labels: labels.iter().filter_map(position).collect(),
+            lengths: table.lengths(),
             largest,
         })
     }
@@ -150,7 +162,17 @@ impl Layout {
             let text = &record[column];
             // NaN and infinities parse but are not states of a robot, nor are numbers beyond the range of an f32.
             let number = text.parse().ok().filter(|x: &f64| x.abs() <= self.largest);
-            number.ok_or_else(|| wrong(column, text))
+            let number = number.ok_or_else(|| wrong(column, text))?;
+            let name = header[column].as_str();
+            match millimetres(number).filter(|_| self.lengths.contains(&name)) {
+                None => Ok(number),
+                Some(slip) => Err(EvalError::Unit {
+                    line,
+                    column: name.to_owned(),
+                    found: text.clone(),
+                    slip,
+                }),
+            }
         };
         self.inputs.iter().map(number).collect()
     }

@@ -14,12 +14,29 @@ pub(super) const LINK_MASS: Allowed = Allowed::above_zero(1000.0, "kg");
 pub(super) const LINK_INERTIA: Allowed = Allowed::above_zero(1000.0, "kg m2");
 /// About three turns either way.
 pub(super) const ANGLE: Allowed = Allowed::within(-20.0, 20.0, "rad");
-pub(super) const ANGULAR_SPEED: Allowed = Allowed::above_zero(1000.0, "rad/s");
-pub(super) const SPEED: Allowed = Allowed::above_zero(100.0, "m/s");
+pub(super) const POSITION: Each<4> = joints(ANGLE, COORDINATE);
+pub(super) const VELOCITY: Each<4> = joints(
+    Allowed::above_zero(1000.0, "rad/s"),
+    Allowed::above_zero(100.0, "m/s"),
+);
+pub(super) const ACCELERATION: Each<4> = joints(
+    Allowed::above_zero(1e5, "rad/s2"),
+    Allowed::above_zero(1e4, "m/s2"),
+);
+pub(super) const JERK: Each<4> = joints(
+    Allowed::above_zero(1e8, "rad/s3"),
+    Allowed::above_zero(1e7, "m/s3"),
+);
+pub(super) const EFFORT: Each<4> = joints(
+    Allowed::above_zero(1e6, "N m"),
+    Allowed::above_zero(1e7, "N"),
+);
 pub(super) const GRAVITY: Allowed = Allowed::within(-100.0, 100.0, "m/s2");
 pub(super) const PAYLOAD_MAX: Allowed = Allowed::above_zero(100.0, "kg");
-pub(super) const GEAR_RATIO: Allowed = Allowed::above_zero(1e4, "");
-pub(super) const SCREW_LEAD: Allowed = Allowed::above_zero(1.0, "m");
+pub(super) const GEAR_RATIO: Allowed = Allowed::within(0.01, 1e4, "");
+/// Of a motor with the torque above: a thousand times that of those shipped.
+pub(super) const ROTOR_INERTIA: Allowed = Allowed::within(0.0, 1.0, "kg m2");
+pub(super) const SCREW_LEAD: Allowed = Allowed::within(1e-5, 1.0, "m");
 /// Limit of the Command message.
 pub(super) const MOTOR_TORQUE: Allowed = Allowed::above_zero(200.0, "N m");
 /// Limit of the Feedback message, less a fifth for a motor driven beyond its limit.
@@ -117,25 +134,25 @@ pub struct Dh {
 #[schemars(transform = Unused(UNUSED))]
 pub struct Limits {
     /// Smallest positions.
-    #[schemars(transform = joints(ANGLE, COORDINATE))]
+    #[schemars(transform = by(POSITION))]
     pub lower: [f64; 4],
     /// Largest positions; above the smallest.
-    #[schemars(transform = joints(ANGLE, COORDINATE))]
+    #[schemars(transform = by(POSITION))]
     pub upper: [f64; 4],
     /// Largest speeds.
-    #[schemars(transform = joints(ANGULAR_SPEED, SPEED))]
+    #[schemars(transform = by(VELOCITY))]
     pub velocity: [f64; 4],
-    /// Largest accelerations, rad/s2 and m/s2.
-    #[schemars(transform = by(ANY_POSITIVE))]
+    /// Largest accelerations.
+    #[schemars(transform = by(ACCELERATION))]
     pub acceleration_cap: [f64; 4],
-    /// Largest jerks, rad/s3 and m/s3.
-    #[schemars(transform = by(ANY_POSITIVE))]
+    /// Largest jerks.
+    #[schemars(transform = by(JERK))]
     pub jerk_cap: [f64; 4],
-    /// Largest efforts for a short time, N m and N.
-    #[schemars(transform = by(ANY_POSITIVE))]
+    /// Largest efforts for a short time.
+    #[schemars(transform = by(EFFORT))]
     pub effort_peak: [f64; 4],
-    /// Largest root-mean-square efforts, N m and N; at most the peak.
-    #[schemars(transform = by(ANY_POSITIVE))]
+    /// Largest root-mean-square efforts; at most the peak.
+    #[schemars(transform = by(EFFORT))]
     pub effort_continuous_rms: [f64; 4],
 }
 
@@ -166,7 +183,8 @@ pub struct Link {
 /// What the robot carries.
 #[derive(JsonSchema)]
 pub struct PayloadLimits {
-    /// Not used.
+    /// Payload that the robot is specified with, at most the heaviest: checked, and not used.
+    #[schemars(transform = by(PAYLOAD_MAX))]
     pub rated: Option<f64>,
     /// Heaviest payload.
     #[schemars(transform = by(PAYLOAD_MAX))]
@@ -186,8 +204,8 @@ pub struct Drive {
     /// 1 or -1: sign of the turn of the screw nut that keeps the shaft at its height while the wrist turns by +1 rad.
     #[schemars(extend("enum" = [1.0, -1.0]))]
     pub screw_hand_sign: f64,
-    /// Of rotor and gear input, on the motor side, kg m2.
-    #[schemars(transform = by(ANY_NOT_NEGATIVE))]
+    /// Of rotor and gear input, on the motor side.
+    #[schemars(transform = by(ROTOR_INERTIA))]
     pub rotor_inertia_motor_side: [f64; 4],
     /// Torque that the motor gives at most.
     #[schemars(transform = by(MOTOR_TORQUE))]

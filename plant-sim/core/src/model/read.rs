@@ -9,14 +9,17 @@ mod drive;
 use std::f64::consts::PI;
 
 use super::file::{
-    self, ANGLE, ANGULAR_SPEED, ANY_POSITIVE, COORDINATE, GRAVITY, LENGTH, LINK_INERTIA, LINK_MASS,
-    PAYLOAD_MAX, SPEED, keys,
+    self, ACCELERATION, ANGLE, COORDINATE, EFFORT, GRAVITY, JERK, LENGTH, LINK_INERTIA, LINK_MASS,
+    PAYLOAD_MAX, POSITION, VELOCITY, keys,
 };
 use super::json::{self, Node};
 use super::{Geometry, JointLimits, Link, ModelError, Payload, RobotModel};
-use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
+use crate::allowed::schema::Each;
+use crate::allowed::{
+    Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_mass, check_moments,
+};
 use crate::maths::hypot;
-use crate::text::Source;
+use crate::text::{IN_A_NAME, Source};
 
 /// Tolerance for a derived or implied number to agree with another one: model files carry rounded decimals.
 const SAME: f64 = 1e-9;
@@ -41,15 +44,13 @@ pub(super) fn robot(text: &str) -> Result<(RobotModel, Vec<String>), ModelError>
         &mut warnings,
     )?;
     let model = RobotModel {
-        name: root.string("name")?.to_owned(),
+        name: name(&root)?,
         gravity: gravity(&root)?,
         geometry,
         limits,
         links,
         drive,
-        payload_max: root
-            .get("payload_rated_max_kg", "an object")?
-            .number("max", PAYLOAD_MAX)?,
+        payload_max: payload_max(&root.get("payload_rated_max_kg", "an object")?)?,
         source: Source {
             origin: String::new(),
             text: text.into(),
@@ -63,12 +64,34 @@ pub(super) fn payload(text: &str) -> Result<Payload, ModelError> {
     let value = json::parse(text)?;
     let root = Node::root(text, &value);
     root.refuse_unknown(&keys::<file::PayloadFile>())?;
-    Ok(Payload {
+    let payload = Payload {
         mass: root.number("mass", PAYLOAD_MASS)?,
         com: root.numbers("com_flange_frame", PAYLOAD_COM)?,
         // A point mass, and a gripper's empty hand, are allowed at the flange.
         inertia: inertia(&root, PAYLOAD_INERTIA)?,
-    })
+    };
+    match check_mass(payload.mass, payload.inertia) {
+        Ok(()) => Ok(payload),
+        Err(allowed) => Err(root.get("inertia_com_diag", "")?.wrong(allowed)),
+    }
+}
+
+fn name(root: &Node<'_>) -> Result<String, ModelError> {
+    match root.string("name")? {
+        name if name.contains(char::is_control) => Err(root.get("name", "")?.wrong(IN_A_NAME)),
+        name => Ok(name.to_owned()),
+    }
+}
+
+/// The heaviest payload, which the rated one does not exceed.
+fn payload_max(node: &Node<'_>) -> Result<f64, ModelError> {
+    let max = node.number("max", PAYLOAD_MAX)?;
+    if let Some(rated) = node.optional("rated")
+        && rated.as_number(PAYLOAD_MAX)? > max
+    {
+        return Err(rated.wrong(format!("at most the heaviest payload, {max} kg")));
+    }
+    Ok(max)
 }
 
 fn units(root: &Node<'_>) -> Result<(), ModelError> {
@@ -111,19 +134,15 @@ fn geometry(dh: &Node<'_>, warnings: &mut Vec<String>) -> Result<Geometry, Model
     })
 }
 
-/// Four numbers of the joints: rotary axes as `turning`, the lift as `lift`.
-fn joints(
-    node: &Node<'_>,
-    key: &str,
-    turning: Allowed,
-    lift: Allowed,
-) -> Result<[f64; 4], ModelError> {
+/// Four numbers of the joints.
+fn joints(node: &Node<'_>, key: &str, Each(allowed): Each<4>) -> Result<[f64; 4], ModelError> {
+    let [turning, ..] = allowed;
     let elements = node
         .get(key, format!("an array of 4: {turning}"))?
         .elements::<4>(turning)?;
     let mut numbers = [0.0; 4];
-    for (axis, (number, element)) in numbers.iter_mut().zip(&elements).enumerate() {
-        *number = element.as_number(if axis == 2 { lift } else { turning })?;
+    for ((number, element), allowed) in numbers.iter_mut().zip(&elements).zip(allowed) {
+        *number = element.as_number(allowed)?;
     }
     Ok(numbers)
 }
@@ -131,13 +150,13 @@ fn joints(
 fn limits(node: &Node<'_>, warnings: &mut Vec<String>) -> Result<JointLimits, ModelError> {
     node.warn_of_unknown(&keys::<file::Limits>(), warnings);
     let limits = JointLimits {
-        lower: joints(node, "lower", ANGLE, COORDINATE)?,
-        upper: joints(node, "upper", ANGLE, COORDINATE)?,
-        velocity: joints(node, "velocity", ANGULAR_SPEED, SPEED)?,
-        acceleration: node.numbers("acceleration_cap", ANY_POSITIVE)?,
-        jerk: node.numbers("jerk_cap", ANY_POSITIVE)?,
-        effort: node.numbers("effort_peak", ANY_POSITIVE)?,
-        effort_continuous: node.numbers("effort_continuous_rms", ANY_POSITIVE)?,
+        lower: joints(node, "lower", POSITION)?,
+        upper: joints(node, "upper", POSITION)?,
+        velocity: joints(node, "velocity", VELOCITY)?,
+        acceleration: joints(node, "acceleration_cap", ACCELERATION)?,
+        jerk: joints(node, "jerk_cap", JERK)?,
+        effort: joints(node, "effort_peak", EFFORT)?,
+        effort_continuous: joints(node, "effort_continuous_rms", EFFORT)?,
     };
     each(node, "upper", limits.upper, limits.lower, |upper, lower| {
         (upper <= lower).then(|| format!("above the lower limit {lower}"))

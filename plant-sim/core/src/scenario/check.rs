@@ -14,7 +14,9 @@ use super::{
     check_rate,
 };
 use crate::allowed::schema::Each;
-use crate::allowed::{Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_moments};
+use crate::allowed::{
+    Allowed, PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS, check_mass, check_moments,
+};
 use crate::model::RobotModel;
 use crate::text;
 
@@ -37,10 +39,19 @@ pub(super) const AMOUNT: Allowed = Allowed::within(0.0, 1e9, "");
 pub(super) const MOMENT: Allowed = Allowed::within(0.0, 1e9, "s");
 pub(super) const FACTOR: Allowed = Allowed::within(0.0, 10.0, "");
 
+/// What to say of a length that is no number of metres, but one of millimetres.
+pub fn millimetres(length: f64) -> Option<String> {
+    LENGTH.check(length).err()?;
+    LENGTH.slip(length)
+}
+
 impl Scenario {
     /// Checks everything that does not depend on the robot.
     pub(super) fn check(&self) -> Result<(), ScenarioError> {
         let mut findings = Findings::of(self);
+        if self.name.contains(char::is_control) {
+            findings.wrong("name", format!("{:?}", self.name), text::IN_A_NAME);
+        }
         if !(1..=MAX_CYCLES).contains(&self.cycles) {
             findings.wrong("cycles", self.cycles, format!("1 to {MAX_CYCLES}"));
         }
@@ -267,6 +278,8 @@ impl<'a> Findings<'a> {
             && let Err((axis, allowed)) = check_moments(moments)
         {
             self.wrong(&format!("{inertia}[{axis}]"), moments[axis], allowed);
+        } else if let Err(allowed) = check_mass(payload.mass, moments) {
+            self.wrong(&inertia, format!("{moments:?}"), allowed);
         }
     }
 

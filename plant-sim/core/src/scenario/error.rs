@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use protocol::messages::WristTurn;
+
 use crate::text::{lines, nearest};
 
 /// Why there is no scenario.
@@ -69,6 +71,8 @@ impl fmt::Display for Place {
 /// most likely was meant.
 pub(super) fn for_people(message: &str) -> String {
     let message = in_words(message);
+    let message: Vec<_> = message.lines().map(shortened).collect();
+    let message = message.join("\n");
     let unknown = ["unknown field ", "unknown word "]
         .iter()
         .find_map(|words| message.rsplit_once(words));
@@ -87,14 +91,25 @@ pub(super) fn for_people(message: &str) -> String {
     }
 }
 
+/// A line that fits a few lines of a terminal.
+fn shortened(line: &str) -> String {
+    const MOST: usize = 500;
+    match line.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{} ...", &line[..end]),
+        None => line.to_owned(),
+    }
+}
+
 /// Types as a person who writes TOML names them.
-const WORDS: [(&str, &str); 12] = [
-    ("expected u32", "expected a whole number, 0 or more"),
+const WORDS: [(&str, &str); 13] = [
+    (
+        "expected u32",
+        "expected a whole number from 0 to 4294967295",
+    ),
     (
         "expected u64",
         "expected a whole number from 0 to 9223372036854775807",
     ),
-    ("expected i8", "expected a whole number from -2 to 2"),
     (
         "wanted exactly 1 element, more than 1 element",
         "expected one step, found several: each needs a [[cycle]] of its own",
@@ -116,10 +131,18 @@ const WORDS: [(&str, &str); 12] = [
         "no step, expected a table such as { dwell = 0.1 }",
     ),
     ("unknown variant", "unknown word"),
+    // Only a table without keys is allowed where none are available.
+    (
+        "unexpected keys in table: ",
+        "expected {}: a place has no values, and this table has ",
+    ),
+    (", available keys:", ""),
 ];
 
 fn in_words(message: &str) -> String {
-    let mut message = message.to_owned();
+    let most = WristTurn::MOST;
+    let turn = format!("expected a whole number from -{most} to {most}");
+    let mut message = message.replace("expected i8", &turn);
     for (type_name, words) in WORDS {
         message = message.replace(type_name, words);
     }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::super::file::{
     self, ANY_NOT_NEGATIVE, ANY_POSITIVE, FEWEST_COUNTS, GEAR_RATIO, MOTOR_SPEED, MOTOR_TORQUE,
-    SCREW_LEAD, keys,
+    ROTOR_INERTIA, SCREW_LEAD, keys,
 };
 use super::super::json::Node;
 use super::super::{AXES, DriveTrain, JointLimits, ModelError};
@@ -33,7 +33,7 @@ pub(super) fn drive(
         gear_ratio: node.numbers("gear_ratio", GEAR_RATIO)?,
         screw_lead: node.number("ball_screw_lead_m_per_rev", SCREW_LEAD)?,
         screw_hand,
-        rotor_inertia: node.numbers("rotor_inertia_motor_side", ANY_NOT_NEGATIVE)?,
+        rotor_inertia: node.numbers("rotor_inertia_motor_side", ROTOR_INERTIA)?,
         motor_torque_limit: node.numbers("motor_torque_limit_model", MOTOR_TORQUE)?,
         motor_torque_rated: node.numbers("motor_rated_torque", MOTOR_TORQUE)?,
         motor_speed_limit: node.numbers("motor_max_speed_rad_s", MOTOR_SPEED)?,
