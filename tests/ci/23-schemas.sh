@@ -51,7 +51,8 @@ validate decoded "$work/decoded.jsonl"
 "$plant_sim" model >"$work/controller-model.json"
 validate controller-model "$work/controller-model.json"
 "$plant_sim" check pick-place --json >"$work/plan.json"
-validate plan "$work/plan.json"
+"$plant_sim" check --set cycle[0].jump.top=-0.29 --json >"$work/refused.json" 2>"$work/refused.err" && fail "nothing is refused"
+validate plan "$work/plan.json" "$work/refused.json"
 
 echo "- cases and results of a campaign"
 validate campaign-cases plant-sim/campaigns/*.toml

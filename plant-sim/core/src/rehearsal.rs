@@ -2,7 +2,10 @@
 //! its plans on an arm that is always where it is to be.
 //!
 //! It is the controller of a run, so what it refuses here it refuses there, and for the same reasons. Torques are those that
-//! its model needs for the planned motion.
+//! its model needs for the planned motion. Whether law, gains and rate can follow the plan is tried in a cycle on the robot that
+//! the controller believes in.
+
+mod trial;
 
 use std::collections::VecDeque;
 
@@ -20,7 +23,6 @@ use serde::Serialize;
 
 use crate::operator::program::{Action, Program, Task};
 use crate::setup::{RunConfig, SetupError};
-use crate::text::lines;
 use crate::world::{CellEvent, OperatorError, Spot};
 
 /// Distance within which a cycle ends where it began, rad and m: roundings of f32, and far below what matters.
@@ -45,6 +47,8 @@ pub struct Plan {
     pub torque_utilisation: [f64; 4],
     /// Greatest speed over its limit, by joint.
     pub speed_utilisation: [f64; 4],
+    /// What keeps it from running; empty where nothing does. With anything here, the numbers are those of what could be planned.
+    pub refused: Vec<Refused>,
 }
 
 /// A move as planned.
@@ -60,30 +64,44 @@ pub struct Move {
     pub torque_utilisation: [f64; 4],
 }
 
-/// Why there is no plan.
-#[derive(Debug, thiserror::Error)]
-pub enum RehearsalError {
-    /// The run could not begin.
-    #[error(transparent)]
-    Setup(#[from] SetupError),
-    /// It would end early: what is refused, or what else ends it.
-    #[error("{}", lines(.0))]
-    Operator(Vec<OperatorError>),
+/// A step that would end the run, or what else would.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Refused {
+    /// Cycle of the run, counted from 1; `null` where it is no single step.
+    pub cycle: Option<u32>,
+    /// Key in the scenario, such as `cycle[2].line`; `null` as above.
+    pub step: Option<String>,
+    /// What is refused and why, in the words of the run.
+    pub reason: String,
+}
+
+impl From<OperatorError> for Refused {
+    fn from(error: OperatorError) -> Self {
+        let spot = match error {
+            OperatorError::Refused { spot, .. } | OperatorError::Unfinished { spot, .. } => spot,
+            _ => None,
+        };
+        Self {
+            cycle: spot.map(|spot| spot.cycle.saturating_add(1)),
+            step: spot.map(|spot| spot.key()),
+            reason: error.to_string(),
+        }
+    }
 }
 
 /// Plans a scenario. After a refusal it goes on to the end of the cycle, from where the arm then is: whoever mends one step
 /// wants to know of the others.
 ///
 /// # Errors
-/// See [`RehearsalError`].
-pub fn rehearse(config: &RunConfig) -> Result<Plan, RehearsalError> {
+/// The run could not begin.
+pub fn rehearse(config: &RunConfig) -> Result<Plan, SetupError> {
     let rig = config.rig()?;
     let scenario = &config.scenario;
     let mut stage = Stage::new(rig.controller(), rig.start.map(|q| q as f32).into());
     let cycles = u64::from(scenario.cycles);
     let (mut done, mut begun, mut from) = (0, 0, stage.pose());
     let mut repeated = 0;
-    let mut refused = Vec::new();
+    let mut refused: Vec<Refused> = Vec::new();
     for Task { action, spot } in Program::new(scenario) {
         match action {
             Action::Cell(CellEvent::BeginCycle) => (begun, from) = (stage.samples, stage.pose()),
@@ -102,16 +120,16 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, RehearsalError> {
             Action::EmergencyStop => break,
             _ => match stage.act(&action, spot) {
                 Ok(()) => {}
-                Err(refusal @ OperatorError::Refused { .. }) => refused.push(refusal),
+                Err(refusal @ OperatorError::Refused { .. }) => refused.push(refusal.into()),
                 Err(end) => {
-                    refused.push(end);
+                    refused.push(end.into());
                     break;
                 }
             },
         }
     }
-    if !refused.is_empty() {
-        return Err(RehearsalError::Operator(refused));
+    if refused.is_empty() {
+        refused.extend(trial::failure(config));
     }
     Ok(Plan {
         scenario: scenario.name.clone(),
@@ -121,6 +139,7 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, RehearsalError> {
         torque_utilisation: stage.torque,
         speed_utilisation: stage.speed,
         moves: stage.moves,
+        refused,
     })
 }
 

@@ -9,7 +9,7 @@
 )]
 
 use sim::observer::{Observer, Truth};
-use sim::rehearsal::{RehearsalError, rehearse};
+use sim::rehearsal::{Refused, rehearse};
 use sim::run::in_process;
 use sim::scenario::{Change, Scenario};
 use sim::setup::RunConfig;
@@ -20,6 +20,11 @@ fn scenario(steps: &str) -> RunConfig {
         "name = \"t\"\ncycles = 2\nrate_hz = 1000\nlaw = \"computed-torque:observer\"\nstart = [0.5, 0.1, -0.2, 0.0]\n{steps}\n"
     );
     RunConfig::new(Scenario::parse(&text, "t").unwrap())
+}
+
+/// What keeps a scenario from running.
+fn refused(config: &RunConfig) -> Vec<Refused> {
+    rehearse(config).unwrap().refused
 }
 
 fn run(config: &RunConfig) -> Summary {
@@ -83,7 +88,7 @@ fn a_million_cycles_are_planned_once() {
 
 #[test]
 fn what_a_rehearsal_refuses_a_run_refuses_in_the_same_words() {
-    let refused = [
+    let cases = [
         (
             "[[cycle]]\nline = { to = [5.0, 0.1, -0.2, 0.0] }",
             "cycle[0].line",
@@ -105,17 +110,18 @@ fn what_a_rehearsal_refuses_a_run_refuses_in_the_same_words() {
             "step 1 of cycle 1",
         ),
     ];
-    for (steps, key, word) in refused {
+    for (steps, key, word) in cases {
         let config = scenario(steps);
-        let Err(RehearsalError::Operator(error)) = rehearse(&config) else {
-            panic!("{steps}: not refused");
+        let all = refused(&config);
+        let [only] = all.as_slice() else {
+            panic!("{steps}: {all:?}");
         };
-        assert_eq!(error.len(), 1, "{error:?}");
-        let error = error[0].to_string();
+        assert_eq!((only.cycle, only.step.as_deref()), (Some(1), Some(key)));
+        let error = &only.reason;
         assert!(error.contains(key) && error.contains(word), "{error}");
         // The robot of a run is where it is in other digits.
         let words = |text: &str| text.replace(|c: char| c.is_ascii_digit() || c == '.', "");
-        assert_eq!(words(&run(&config).error.unwrap()), words(&error));
+        assert_eq!(words(&run(&config).error.unwrap()), words(error));
     }
 }
 
@@ -125,15 +131,39 @@ fn every_step_that_is_refused_is_named() {
         "[[cycle]]\nline = { to = [5.0, 0.1, -0.2, 0.0] }\n[[cycle]]\njoints = { to = [0.5, 1.5, 0.1, 0.0] }\n\
          [[cycle]]\njoints = { to = [0.5, -1.5, 0.5, 0.0] }\n[[cycle]]\ndwell = 0.1",
     );
-    let Err(RehearsalError::Operator(errors)) = rehearse(&config) else {
-        panic!("not refused");
-    };
-    let words: Vec<String> = errors.iter().map(ToString::to_string).collect();
+    let words: Vec<String> = refused(&config).into_iter().map(|it| it.reason).collect();
     assert_eq!(words.len(), 2, "{words:?}");
     assert!(
         words[0].contains("cycle[0].line") && words[1].contains("cycle[2].joints"),
         "{words:?}"
     );
+}
+
+/// Whether a law can follow at a rate is what a run shows: one is the oracle of the other.
+#[test]
+fn a_rate_too_low_for_law_and_speed_is_foreseen() {
+    let mut foreseen = 0;
+    for law in ["computed-torque:observer", "pd-gravity", "pid"] {
+        for rate_hz in [100.0, 150.0, 250.0, 1000.0] {
+            let mut config = RunConfig::new(Scenario::built_in("gate").unwrap());
+            config.scenario.cycles = 1;
+            config.scenario.law = law.parse().unwrap();
+            config.scenario.rate_hz = rate_hz;
+            let (all, error) = (refused(&config), run(&config).error);
+            assert_eq!(all.is_empty(), error.is_none(), "{law} at {rate_hz} Hz");
+            if let (Some(first), Some(error)) = (all.first(), error) {
+                assert!(first.reason.starts_with(&error), "{}", first.reason);
+                foreseen += 1;
+            }
+        }
+    }
+    assert!((3..10).contains(&foreseen), "{foreseen}");
+    // What breaks in the run is none of its business, and one that is to stop may.
+    let mut config = RunConfig::new(Scenario::built_in("gate").unwrap());
+    config.scenario.faults = vec!["encoder:elbow:stuck@0.4s".parse().unwrap()];
+    assert_eq!(refused(&config), []);
+    let config = RunConfig::new(Scenario::built_in("estop-descent").unwrap());
+    assert_eq!(refused(&config), []);
 }
 
 #[test]
@@ -186,10 +216,8 @@ fn elbow_and_turn_are_asked_for_in_start_jump_and_line() {
             "with elbow negative",
         ),
     ] {
-        let Err(RehearsalError::Operator(errors)) = rehearse(&scenario(steps)) else {
-            panic!("{steps}: not refused");
-        };
-        assert!(errors[0].to_string().contains(word), "{}", errors[0]);
+        let reason = &refused(&scenario(steps))[0].reason;
+        assert!(reason.contains(word), "{reason}");
     }
 }
 

@@ -3,20 +3,16 @@
 use std::fmt::Write as _;
 
 use clap::Args;
-use sim::rehearsal::{Plan, RehearsalError, rehearse};
-use sim::world::OperatorError;
+use sim::rehearsal::{Plan, rehearse};
 
-use super::run::{ConfigArgs, what};
+use super::run::{ConfigArgs, ScenarioArgs};
 use super::{Failure, show};
 
 /// Arguments of `check`.
 #[derive(Args)]
 pub(super) struct CheckArgs {
-    #[arg(value_name = "NAME|FILE", default_value = "gate", help = what("check"))]
-    name: String,
-    /// The same, written as for run.
-    #[arg(long, value_name = "NAME|FILE", conflicts_with = "name")]
-    scenario: Option<String>,
+    #[command(flatten)]
+    scenario: ScenarioArgs,
     #[command(flatten)]
     config: ConfigArgs,
     /// Print JSON instead of text.
@@ -26,33 +22,30 @@ pub(super) struct CheckArgs {
 
 /// Plans the scenario and shows durations and torques. Fails where the controller would refuse a step.
 pub(super) fn run(args: &CheckArgs) -> Result<(), Failure> {
-    let scenario = args.scenario.as_ref().unwrap_or(&args.name);
-    let config = args.config.config(scenario)?;
-    let plan = rehearse(&config).map_err(|error| match error {
-        RehearsalError::Setup(error) => Failure::usage(error),
-        RehearsalError::Operator(errors) => {
-            Failure::failed(refused(&config.scenario.name, &errors))
-        }
-    })?;
+    let config = args.config.config(args.scenario.name())?;
+    let plan = rehearse(&config).map_err(Failure::usage)?;
     if args.json {
         let json = serde_json::to_string_pretty(&plan).map_err(|error| error.to_string())?;
-        show(&(json + "\n"))
-    } else {
-        show(&text(&plan))
+        show(&(json + "\n"))?;
+    } else if plan.refused.is_empty() {
+        show(&text(&plan))?;
     }
+    refused(&plan)
 }
 
-/// Why a scenario cannot run. A step after a refused one has another start than it would have.
-fn refused(name: &str, errors: &[OperatorError]) -> String {
-    match errors {
-        [error] => format!("scenario {name} cannot run: {error}"),
-        _ => errors.iter().fold(
+/// Fails with why a scenario cannot run. A step after a refused one has another start than it would have.
+fn refused(plan: &Plan) -> Result<(), Failure> {
+    let name = &plan.scenario;
+    Err(Failure::failed(match plan.refused.as_slice() {
+        [] => return Ok(()),
+        [refused] => format!("scenario {name} cannot run: {}", refused.reason),
+        all => all.iter().fold(
             format!(
                 "scenario {name} cannot run; after a refusal, steps are planned from where the arm is:"
             ),
-            |text, error| text + &format!("\n  {error}"),
+            |text, refused| text + &format!("\n  {}", refused.reason),
         ),
-    }
+    }))
 }
 
 /// Moves that are listed; of a longer scenario the totals say enough.

@@ -23,7 +23,7 @@ use super::{Failure, show};
 /// Arguments of `cost`.
 #[derive(Args)]
 pub(super) struct CostArgs {
-    #[arg(long, value_name = "NAME|FILE", default_value = "gate", help = what("run"))]
+    #[arg(long, value_name = "NAME|FILE", default_value = "gate", help = what())]
     scenario: String,
     /// Control law, as for run; the default is the most expensive one.
     #[arg(

@@ -24,16 +24,14 @@ use sim::curves::Curves;
 use sim::setup::RunConfig;
 
 use super::{Failure, show};
-pub(super) use config::{ConfigArgs, load, what};
+pub(super) use config::{ConfigArgs, ScenarioArgs, USUAL, load, what};
 use mcap::McapFile;
 use place::{Place, PlaceArgs};
 use verdicts::VerdictArgs;
 
 /// What to run, and where the results go.
-#[derive(Args, Clone)]
+#[derive(Args)]
 pub(super) struct RunArgs {
-    #[arg(long, value_name = "NAME|FILE", default_value = "gate", help = config::what("run"))]
-    scenario: String,
     #[command(flatten)]
     config: ConfigArgs,
     #[command(flatten)]
@@ -62,35 +60,25 @@ pub(super) struct RunArgs {
     mcap: Option<PathBuf>,
 }
 
-/// Arguments of `run`, where the scenario may stand alone; without the command it could not be told from one.
+/// Arguments of `run`; without the command a scenario that stands alone could not be told from one.
 #[derive(Args)]
 pub(super) struct NamedRunArgs {
-    /// The same as --scenario.
-    #[arg(value_name = "NAME|FILE", conflicts_with = "scenario")]
-    name: Option<String>,
     #[command(flatten)]
-    run: RunArgs,
-}
-
-impl From<NamedRunArgs> for RunArgs {
-    fn from(NamedRunArgs { name, run }: NamedRunArgs) -> Self {
-        match name {
-            Some(scenario) => Self { scenario, ..run },
-            None => run,
-        }
-    }
+    pub scenario: ScenarioArgs,
+    #[command(flatten)]
+    pub run: RunArgs,
 }
 
 /// Runs the scenario, writes the results and shows the summary.
-pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
+pub(super) fn run(scenario: &str, args: &RunArgs) -> Result<(), Failure> {
     let place = args.place.place()?;
-    let config = args.config.config(&args.scenario)?;
+    let config = args.config.config(scenario)?;
     // Everything that can be refused is, before the folder is touched.
     config.rig().map_err(Failure::usage)?;
     let results = run::results(&args.out);
     let outputs = results.iter().chain(&args.mcap).map(PathBuf::as_path);
     output::distinct(
-        args.config.inputs(&args.scenario),
+        args.config.inputs(scenario),
         outputs.chain(args.verdicts.paths()),
     )?;
     let verdicts = args.verdicts.create()?;

@@ -22,7 +22,7 @@ use trace::{Entry, Interface, Record};
 
 use super::arrival::record;
 use super::bitrate::bit_timing;
-use super::run::{ConfigArgs, what};
+use super::run::{ConfigArgs, ScenarioArgs};
 use super::{Failure, show};
 
 /// Room for wishes that the loop has not yet taken.
@@ -35,11 +35,8 @@ const BATCH: usize = 4096;
 /// Arguments of `view`.
 #[derive(Args)]
 pub(super) struct ViewArgs {
-    #[arg(value_name = "NAME|FILE", default_value = "gate", help = what("show"))]
-    name: String,
-    /// The same, written as for run.
-    #[arg(long, value_name = "NAME|FILE", conflicts_with = "name")]
-    scenario: Option<String>,
+    #[command(flatten)]
+    scenario: ScenarioArgs,
     #[command(flatten)]
     config: ConfigArgs,
     /// Watch this bus instead of running a scenario: socketcan:INTERFACE, slcan:TERMINAL, slcan:tcp:HOST:PORT or
@@ -75,8 +72,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<(), Failure> {
 
 /// A run of its own, in real time.
 fn live(args: &ViewArgs) -> Result<(), Failure> {
-    let scenario = args.scenario.as_ref().unwrap_or(&args.name);
-    let config = args.config.config(scenario)?;
+    let config = args.config.config(args.scenario.name())?;
     config.rig().map_err(Failure::usage)?;
     interrupt::listen()?;
     let recording = recording(args)?;

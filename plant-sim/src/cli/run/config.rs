@@ -14,16 +14,36 @@ use sim::setup::RunConfig;
 use crate::cli::Failure;
 use crate::cli::values::{number, whole};
 
-/// Help for the name of a scenario that a command is to `act` on.
-pub(crate) fn what(act: &str) -> String {
+/// Scenario where none is named.
+pub(crate) const USUAL: &str = "gate";
+
+/// Help for a scenario.
+pub(crate) fn what() -> String {
     format!(
-        "What to {act}: a scenario file, or one that comes with the program: {}",
+        "A scenario file, or the name of one that comes with the program: {}",
         scenario::names().join(", ")
     )
 }
 
+/// A scenario, which may stand alone.
+#[derive(Args)]
+pub(crate) struct ScenarioArgs {
+    #[arg(value_name = "NAME|FILE", default_value = USUAL, help = what())]
+    name: String,
+    /// The same, written as without a command.
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "name")]
+    scenario: Option<String>,
+}
+
+impl ScenarioArgs {
+    /// Name or file.
+    pub(crate) fn name(&self) -> &str {
+        self.scenario.as_ref().unwrap_or(&self.name)
+    }
+}
+
 /// Options that change a scenario and choose robots.
-#[derive(Args, Clone)]
+#[derive(Args)]
 pub(crate) struct ConfigArgs {
     /// Change one value of the scenario: gains.bandwidth=80, cycle[1].line.speed=0.5, mismatch.friction=1.2. May be repeated.
     #[arg(long, value_name = "KEY=VALUE")]

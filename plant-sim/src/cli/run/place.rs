@@ -11,7 +11,7 @@ use crate::cli::Failure;
 use crate::cli::values::image;
 
 /// Options that say where the controller is.
-#[derive(Args, Clone)]
+#[derive(Args)]
 pub(super) struct PlaceArgs {
     /// The bus: builtin is the bit-timed simulated one; socketcan:INTERFACE, slcan:TERMINAL or
     /// slcan:tcp:HOST:PORT lead to an external controller.
@@ -34,8 +34,19 @@ pub(super) struct PlaceArgs {
     channel: Option<ChannelChoice>,
     /// Show the built-in bus to CAN tools, which connect to slcan:tcp:HOST:PORT as to an adapter. The
     /// run waits for the first one and then runs in real time.
-    #[arg(long, value_name = "slcan:tcp:HOST:PORT")]
-    listen: Option<LinkAddress>,
+    #[arg(long, value_name = "slcan:tcp:HOST:PORT", value_parser = server)]
+    listen: Option<String>,
+}
+
+/// Host and port at which tools connect.
+fn server(text: &str) -> Result<String, String> {
+    match text.parse() {
+        Ok(LinkAddress::Slcan(SlcanPeer::Tcp(server))) => Ok(server),
+        _ => Err(
+            "allowed: slcan:tcp:HOST:PORT with the port of this machine for tools to connect to (slcan:tcp:localhost:29536)"
+                .into(),
+        ),
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -114,8 +125,7 @@ impl PlaceArgs {
             _ if self.real_time => Err("--real-time needs --controller external".into()),
             (ControllerChoice::InProcess, BusChoice::Builtin) => match &self.listen {
                 None => Ok(Place::InProcess),
-                Some(LinkAddress::Slcan(SlcanPeer::Tcp(server))) => Ok(Place::Watched(server)),
-                Some(_) => Err("--listen allows slcan:tcp:HOST:PORT only".into()),
+                Some(server) => Ok(Place::Watched(server)),
             },
             (ControllerChoice::Qemu, BusChoice::Builtin) => Ok(Place::Qemu(qemu::Options {
                 image: self.image.clone(),

@@ -10,7 +10,7 @@ use plant_sim::verdicts::{junit, markdown, needs};
 use crate::cli::Failure;
 
 /// Options that name files for other programs.
-#[derive(Args, Clone)]
+#[derive(Args)]
 pub(super) struct VerdictArgs {
     /// Write the verdicts to this file as JUnit XML, for CI: a test case for the end of the run and for each requirement.
     #[arg(long, value_name = "FILE")]
