@@ -2,6 +2,8 @@
 //!
 //! What is no regular file stays what it is: a character device and a FIFO are written to, everything else is refused.
 
+mod place;
+
 use std::fs::{self, FileType, Permissions, TryLockError};
 use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::{FileTypeExt as _, OpenOptionsExt as _, PermissionsExt as _};
@@ -9,6 +11,9 @@ use std::path::{Path, PathBuf};
 
 use rustix::fs::OFlags;
 use tempfile::NamedTempFile;
+
+use place::{Place, folder, place};
+pub use place::{distinct, refuse_tilde};
 
 /// Results cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -75,38 +80,28 @@ impl File {
                 hint: "leave the option out to write to standard output",
             });
         }
-        let place = match fs::metadata(path).map(|there| there.file_type()) {
-            Ok(there) if there.is_file() => {
-                fs::canonicalize(path).map_err(OutputError::at(path))?
-            }
-            Ok(there) if there.is_char_device() || there.is_fifo() => {
+        refuse_tilde(path)?;
+        let place = match place(path).map_err(OutputError::at(path))? {
+            Place::File(_) => fs::canonicalize(path).map_err(OutputError::at(path))?,
+            Place::Free => path.into(),
+            Place::Stream => {
                 return Ok(Self {
                     sink: Sink::Through(through(path)?),
                     path: path.into(),
                 });
             }
-            Ok(there) => return Err(taken(path, there, "name another file")),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                match fs::symlink_metadata(path) {
-                    Ok(link) => return Err(taken(path, link.file_type(), "name another file")),
-                    Err(_) => path.into(),
-                }
-            }
-            Err(error) => return Err(OutputError::at(path)(error)),
+            Place::Other(there) => return Err(taken(path, there, "name another file")),
         };
         Self::beside(place, ".partial-")
     }
 
     fn beside(path: PathBuf, prefix: &str) -> Result<Self, OutputError> {
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
         let file = tempfile::Builder::new()
             .prefix(prefix)
             // As with `std::fs::File::create`; the umask of the process applies.
             .permissions(Permissions::from_mode(0o666))
-            .tempfile_in(folder)
+            .tempfile_in(folder(&path))
+            .map_err(without_path)
             .map_err(OutputError::at(&path))?;
         Ok(Self {
             sink: Sink::New(BufWriter::new(file)),
@@ -148,6 +143,14 @@ impl Write for File {
     }
 }
 
+/// An error of `tempfile`, which names the file under construction: nobody knows that one.
+fn without_path(error: io::Error) -> io::Error {
+    match error.to_string().split_once(" at path ") {
+        Some((what, _)) => io::Error::new(error.kind(), what.to_owned()),
+        None => error,
+    }
+}
+
 /// A device or FIFO, opened. A FIFO that nobody reads would keep the program waiting.
 fn through(path: &Path) -> Result<BufWriter<fs::File>, OutputError> {
     fs::OpenOptions::new()
@@ -167,51 +170,6 @@ fn through(path: &Path) -> Result<BufWriter<fs::File>, OutputError> {
             },
             _ => OutputError::at(path)(error),
         })
-}
-
-/// Refuses outputs of a command that would replace one of its inputs or each other. Inputs that are no files do not matter.
-///
-/// # Errors
-/// [`OutputError::Taken`].
-pub fn distinct<'p>(
-    inputs: impl IntoIterator<Item = &'p Path>,
-    outputs: impl IntoIterator<Item = &'p Path>,
-) -> Result<(), OutputError> {
-    let inputs = inputs
-        .into_iter()
-        .filter_map(|path| fs::canonicalize(path).ok());
-    let mut known: Vec<_> = inputs
-        .map(|place| (place, "an input of this command"))
-        .collect();
-    for path in outputs {
-        let Some(place) = place(path) else {
-            continue;
-        };
-        if let Some(&(_, what)) = known.iter().find(|(other, _)| *other == place) {
-            return Err(OutputError::Taken {
-                path: path.into(),
-                what,
-                hint: "name another file",
-            });
-        }
-        known.push((place, "another output of this command"));
-    }
-    Ok(())
-}
-
-/// Where a regular file is or would be. Several outputs may go to one device.
-fn place(path: &Path) -> Option<PathBuf> {
-    match fs::metadata(path) {
-        Ok(there) if !there.is_file() => None,
-        Ok(_) => fs::canonicalize(path).ok(),
-        Err(_) => {
-            let folder = path
-                .parent()
-                .filter(|folder| !folder.as_os_str().is_empty());
-            let folder = fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?;
-            Some(folder.join(path.file_name()?))
-        }
-    }
 }
 
 fn taken(path: &Path, there: FileType, hint: &'static str) -> OutputError {
@@ -267,6 +225,7 @@ impl Folder {
     /// # Errors
     /// It cannot be created.
     pub fn open(path: &Path, names: &'static [&'static str]) -> Result<Self, OutputError> {
+        refuse_tilde(path)?;
         if let Ok(there) = fs::metadata(path)
             && !there.is_dir()
         {

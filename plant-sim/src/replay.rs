@@ -5,7 +5,9 @@
 //! received.
 
 use firmware::control::controller::Config;
-use protocol::messages::Node;
+use protocol::codec;
+use protocol::frame::CanFrame;
+use protocol::messages::{Hello, Message, Node, ParameterRequest, Server};
 use protocol::table;
 use protocol::time::{Duration, Instant};
 use trace::difference::Difference;
@@ -17,6 +19,8 @@ use crate::twin::Twin;
 const WAITING: usize = 64;
 /// Silence after which the controller has nothing left to react to; further silence is skipped.
 const SETTLED: Duration = Duration::from_secs(1);
+/// Samples that show at which rate they come.
+const ENOUGH: u32 = 10;
 
 /// A controller under replay: the twin of the recorded one.
 pub struct Replay {
@@ -24,6 +28,10 @@ pub struct Replay {
     /// Time of the last record.
     now: Instant,
     compared: u64,
+    /// The first and the newest feedback, and their times, us.
+    samples: Option<[(u64, CanFrame); 2]>,
+    /// Schema hash of the peer that asked for the controller's.
+    schema: Option<u32>,
 }
 
 impl Replay {
@@ -34,6 +42,8 @@ impl Replay {
             twin: Twin::new(config),
             now: Instant::ORIGIN,
             compared: 0,
+            samples: None,
+            schema: None,
         }
     }
 
@@ -54,6 +64,17 @@ impl Replay {
         if info.is_some_and(|info| info.sender == Some(Node::Controller)) {
             return Ok(());
         }
+        if info == Some(&table::FEEDBACK) {
+            let newest = (record.time_us, *frame);
+            self.samples = Some([self.samples.map_or(newest, |[first, _]| first), newest]);
+        } else if let Ok(received) = codec::decode(frame)
+            && let Message::ParameterRequest(
+                Server::Controller,
+                ParameterRequest::Hello(Hello { schema, .. }),
+            ) = received.message
+        {
+            self.schema = Some(schema);
+        }
         self.pass_time(Instant::from_micros(record.time_us));
         self.twin.call(self.now, Some(frame));
         let due = self.twin.due();
@@ -70,6 +91,29 @@ impl Replay {
     #[must_use]
     pub fn compared(&self) -> u64 {
         self.compared
+    }
+
+    /// Schema hash of the other nodes of the trace, if they have said it. With another than its own the controller does not
+    /// work.
+    #[must_use]
+    pub fn schema(&self) -> Option<u32> {
+        self.schema
+    }
+
+    /// The rate at which the samples of the trace have come so far, Hz.
+    #[must_use]
+    pub fn rate_hz(&self) -> Option<f64> {
+        let [first, newest] =
+            self.samples?.map(
+                |(time_us, frame)| match codec::decode(&frame).ok()?.message {
+                    Message::Feedback(feedback) => Some((time_us, feedback.sample)),
+                    _ => None,
+                },
+            );
+        let (first, newest) = (first?, newest?);
+        let samples = newest.1.checked_sub(first.1).filter(|&n| n >= ENOUGH)?;
+        let time_us = newest.0.checked_sub(first.0).filter(|&us| us > 0)?;
+        Some(f64::from(samples) / time_us as f64 * 1e6)
     }
 
     /// Lets time pass between two frames, with calls of the controller as when they were recorded.

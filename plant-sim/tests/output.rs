@@ -280,3 +280,75 @@ fn a_standard_output_or_error_that_is_full_or_gone_loses_no_results() {
     assert!(says(&output).contains("cannot write to standard output"));
     assert_eq!(summary(folder.path())["completed"], true);
 }
+
+#[test]
+fn a_tilde_that_the_shell_has_left_makes_no_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in [
+        &["run", "--cycles", "1", "--out", "~/x"][..],
+        &["dbc", "--out", "~/x.dbc"],
+        &["man", "--out", "~"],
+    ] {
+        let output = plant_sim()
+            .args(command)
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(2), "{command:?}");
+        assert!(says(&output).contains("$HOME"), "{}", says(&output));
+    }
+    assert!(names(folder.path()).is_empty());
+    // One of this name may be there.
+    fs::create_dir(folder.path().join("~")).unwrap();
+    let output = plant_sim()
+        .args(["dbc", "--out", "~/x.dbc"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", says(&output));
+    assert_eq!(names(&folder.path().join("~")), ["x.dbc"]);
+}
+
+#[test]
+fn a_file_that_cannot_be_made_is_the_one_that_was_named() {
+    let output = plant_sim()
+        .args(["dbc", "--out", "/nowhere/x.dbc"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let said = says(&output);
+    assert!(
+        said.contains("/nowhere/x.dbc") && !said.contains("partial"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_page_about_two_runs_replaces_neither() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    assert!(
+        run(&out)
+            .args(["--cycles", "1"])
+            .output()
+            .unwrap()
+            .status
+            .success()
+    );
+    let page = out.join("report.html");
+    let before = fs::read(&page).unwrap();
+    let report = plant_sim()
+        .arg("report")
+        .args([&out, &out])
+        .arg("--out")
+        .arg(&page)
+        .output();
+    let report = report.unwrap();
+    assert_eq!(report.status.code(), Some(2));
+    assert!(
+        says(&report).contains("an input of this command"),
+        "{}",
+        says(&report)
+    );
+    assert_eq!(fs::read(&page).unwrap(), before);
+}

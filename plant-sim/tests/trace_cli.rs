@@ -239,7 +239,7 @@ fn a_clock_that_was_set_is_named_and_can_be_left_out() {
         "{text}"
     );
     assert!(
-        text.contains("1 records are earlier than a previous one, by up to 1719999991.100000 s"),
+        text.contains("1 records are earlier than the one before, by up to 1719999991.100000 s"),
         "{text}"
     );
     let (_, json, _) = trace("clock.log", log, &["stats", "--json", "--skip-gaps", "60"]);
@@ -250,6 +250,69 @@ fn a_clock_that_was_set_is_named_and_can_be_left_out() {
         (&period["mean_ms"], &period["max_ms"]),
         (&100.0.into(), &100.0.into())
     );
+}
+
+/// Two logs of the same second, one after the other, are two seconds of a bus, and no bus of twice the load.
+#[test]
+fn a_log_after_another_of_the_same_time_has_its_load() {
+    let one: String = (0..1000_u64)
+        .map(|n| format!("({}.{:03}000) can0 123#0011223344556677\n", 5, n))
+        .collect();
+    let load = |log: &str| {
+        let (code, json, _) = trace("twice.log", log, &["stats", "--json"]);
+        assert_eq!(code, 0);
+        let statistics: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let bus = &statistics["interfaces"][0];
+        let number = |key: &str| bus[key].as_f64().unwrap();
+        (
+            number("load"),
+            number("peak_load"),
+            statistics["span_s"].as_f64().unwrap(),
+        )
+    };
+    let (single, twice) = (load(&one), load(&one.repeat(2)));
+    assert!(
+        (single.0 / twice.0 - 1.0).abs() < 0.01,
+        "{single:?} {twice:?}"
+    );
+    assert!(
+        (single.1 / twice.1 - 1.0).abs() < 0.02,
+        "{single:?} {twice:?}"
+    );
+    assert_eq!((single.2, twice.2), (0.999, 1.998));
+}
+
+/// Interfaces whose clocks differ are no clock that was set.
+#[test]
+fn interfaces_may_be_ahead_of_each_other() {
+    let log: String = (0..100)
+        .map(|n| format!("(50.{n:02}0000) can0 123#\n(1.{n:02}0000) can1 123#\n"))
+        .collect();
+    let (_, json, _) = trace("ahead.log", &log, &["stats", "--json"]);
+    let statistics: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(statistics["backwards"], 0);
+    assert_eq!(statistics["span_s"], 0.99);
+    assert_eq!(statistics["interfaces"][1]["span_s"], 0.99);
+}
+
+#[test]
+fn gaps_below_the_period_are_no_gaps() {
+    let log: String = (0..1000)
+        .map(|n| format!("(5.{n:03}000) can0 123#\n(5.{n:03}150) can0 124#\n"))
+        .collect();
+    let stats = |skip| trace("gaps.log", &log, &["stats", "--skip-gaps", skip]);
+    for skip in ["0", "0.0001", "0.0005"] {
+        let (code, text, messages) = stats(skip);
+        assert_eq!((code, text.as_str()), (2, ""), "{skip}");
+        assert!(messages.contains("0.00"), "{messages}");
+    }
+    for skip in ["0.001", "1"] {
+        let (code, text, _) = stats(skip);
+        assert_eq!(code, 0, "{skip}: {text}");
+    }
+    // What is more than a bus can carry is said.
+    let (_, text, _) = trace("gaps.log", &log, &["stats", "--bitrate", "50k"]);
+    assert!(text.contains("no bus carries more than 100 %"), "{text}");
 }
 
 /// Nine of ten periods within the 90 % range, all of them in the histogram.

@@ -61,7 +61,10 @@ fn an_output_never_replaces_its_input() {
         ] {
             let (code, _, messages) = trace(&[arguments, &out].concat());
             assert_ne!(code, 0);
-            assert!(messages.contains("is the trace itself"), "{messages}");
+            assert!(
+                messages.contains("is an input of this command"),
+                "{messages}"
+            );
         }
     }
     assert_eq!(fs::read_to_string(&path).unwrap(), FOREIGN);
@@ -129,5 +132,20 @@ fn a_signal_shows_what_there_is() {
             "1.300000 can0 124"
         };
         assert!(text.contains(expected), "{text}");
+    }
+}
+
+#[test]
+fn a_message_whose_name_is_nearly_right_is_named() {
+    for (text, near) in [
+        ("Feedbak", Some("Feedback")),
+        ("comand", Some("Command")),
+        ("x", None),
+    ] {
+        let (code, _, said) = trace(&["stats", "nothing.log", "--id", text]);
+        assert_eq!(code, 2);
+        let hint = near.map(|near| format!("did you mean {near}?"));
+        assert_eq!(said.contains("did you mean"), hint.is_some(), "{said}");
+        assert!(hint.is_none_or(|hint| said.contains(&hint)), "{said}");
     }
 }

@@ -14,7 +14,7 @@ use sim::campaign::tally::Outcome;
 
 use super::CampaignError;
 use super::plan::{self, Plan};
-use crate::output::OutputError;
+use crate::output::{OutputError, refuse_tilde};
 
 /// Part `part` of `of`, counted from 0: the cases whose number leaves this remainder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -40,7 +40,7 @@ impl Shard {
     }
 
     /// Name of the file of its results.
-    fn file(self) -> String {
+    pub fn file(self) -> String {
         format!("results-{}-of-{}.jsonl", self.part, self.of)
     }
 }
@@ -114,6 +114,7 @@ impl Results {
         header: &ShardHeader,
         resume: bool,
     ) -> Result<Beginning, CampaignError> {
+        refuse_tilde(folder)?;
         fs::create_dir_all(folder).map_err(CampaignError::write(folder))?;
         let path = folder.join(header.shard.file());
         let partial = partial_of(&path);

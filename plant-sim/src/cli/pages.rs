@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use clap::{Args, Command};
 use clap_complete::Shell;
 
+use plant_sim::output::refuse_tilde;
+
 use super::{Failure, show};
 
 /// Arguments of `completions`.
@@ -44,6 +46,7 @@ pub(super) fn man(args: &ManArgs, command: Command) -> Result<(), Failure> {
     let failed = |error: io::Error| {
         Failure::failed(format!("cannot write to {}: {error}", folder.display()))
     };
+    refuse_tilde(folder)?;
     std::fs::create_dir_all(folder).map_err(failed)?;
     clap_mangen::generate_to(command, folder).map_err(failed)
 }

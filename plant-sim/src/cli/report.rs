@@ -21,7 +21,10 @@ pub(super) struct ReportArgs {
 
 /// Writes the page about both.
 pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
-    let page = report::compare([&args.one, &args.other]).map_err(Failure::usage)?;
+    let folders = [args.one.as_path(), &args.other];
+    let pages = folders.map(|folder| folder.join(report::FILE));
+    output::distinct(pages.iter().map(PathBuf::as_path), [args.out.as_path()])?;
+    let page = report::compare(folders).map_err(Failure::usage)?;
     output::write(&args.out, &page)?;
     show(&format!("{}\n", args.out.display()))?;
     Ok(())

@@ -136,6 +136,13 @@ fn stats(args: &StatsArgs) -> Result<(), Failure> {
         gatherer.record(&record);
     }
     let statistics = gatherer.statistics();
+    if let Some((id, period_s)) = statistics.left_out() {
+        return Err(Failure::usage(format!(
+            "--skip-gaps leaves out most of the time between frames of {}, so that loads and rates would mean nothing; \
+             allowed: more than the {period_s:.6} s from one to the next on average",
+            id.id
+        )));
+    }
     if args.json {
         let json = serde_json::to_string_pretty(&statistics).map_err(|error| error.to_string())?;
         show(&(json + "\n"))?;

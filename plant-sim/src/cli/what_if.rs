@@ -23,6 +23,7 @@ pub(super) struct WhatIfArgs {
 
 /// Writes the page.
 pub(super) fn run(args: &WhatIfArgs) -> Result<(), Failure> {
+    output::distinct([args.module.as_path()], [args.out.as_path()])?;
     let path = args.module.display();
     let module = fs::read(&args.module)
         .map_err(|error| Failure::usage(format!("{path}: cannot be read: {error}")))?;

@@ -32,7 +32,7 @@ pub enum Problem {
     Decimals(usize),
     /// Screen output with unknown time origin.
     #[error(
-        "candump's output for the screen with times other than seconds since 1970; record with candump -L (or candump -t a)"
+        "candump's output for the screen with times other than seconds since 1970: a date lacks its time zone, and other times their start; record with candump -L (or candump -t a)"
     )]
     Screen,
     /// CAN XL frame.

@@ -25,8 +25,12 @@ const PACKED: [(&[u8], &str); 3] = [
     (b"\x28\xB5\x2F\xFD", "zstd"),
 ];
 
-/// First bytes of Vector BLF.
-const BLF: &[u8] = b"LOGG";
+/// First bytes of formats that python-can converts.
+const FOREIGN: [(&[u8], &str, &str); 3] = [
+    (b"LOGG", "Vector BLF", "blf"),
+    (b"MDF ", "ASAM MDF", "mf4"),
+    (b";$FI", "PEAK TRC", "trc"),
+];
 /// Bytes that identify the format.
 const MAGIC: u64 = 4;
 
@@ -42,9 +46,9 @@ pub enum ReadError {
         problem: Problem,
     },
     /// The source failed.
-    #[error("line {line}: {source}")]
+    #[error("{}{source}", if *line > 0 { format!("line {line}: ") } else { String::new() })]
     Io {
-        /// Counted from 1.
+        /// Counted from 1; 0 where the format could not be detected.
         line: u64,
         /// The failure.
         source: io::Error,
@@ -56,6 +60,8 @@ pub struct Reader<R> {
     source: Chain<Cursor<Vec<u8>>, R>,
     format: Option<Format>,
     line: u64,
+    /// Whether any record could be read.
+    has_records: bool,
     buffer: Vec<u8>,
 }
 
@@ -73,6 +79,7 @@ impl<R: BufRead> Reader<R> {
             source: Cursor::new(Vec::new()).chain(source),
             format: None,
             line: 0,
+            has_records: false,
             buffer: Vec::with_capacity(MAX_LINE + 1),
         }
     }
@@ -102,10 +109,13 @@ impl<R: BufRead> Reader<R> {
                 io::ErrorKind::InvalidData,
                 "pcap, not pcapng; convert it with: editcap -F pcapng FILE OUT",
             ));
-        } else if bytes == BLF {
+        } else if let Some((_, format, ending)) = FOREIGN.iter().find(|(magic, ..)| bytes == magic)
+        {
             return Err(io::Error::new(
                 io::ErrorKind::InvalidData,
-                "Vector BLF, which is not read; python-can converts it: python3 -m can.logconvert FILE.blf OUT.log",
+                format!(
+                    "{format}, which is not read; python-can converts it: python3 -m can.logconvert FILE.{ending} OUT.log"
+                ),
             ));
         } else if let Some((_, program)) = PACKED.iter().find(|(magic, _)| bytes.starts_with(magic))
         {
@@ -182,7 +192,14 @@ impl<R: BufRead> Reader<R> {
             };
             match read {
                 None => {}
-                Some(read) if ended || read.as_ref().is_ok_and(is_whole) => return Ok(Some(read)),
+                Some(read) if ended || read.as_ref().is_ok_and(is_whole) => {
+                    self.has_records |= read.is_ok();
+                    return Ok(Some(read));
+                }
+                // A file that begins otherwise was no log when it was cut off.
+                Some(Err(problem)) if !self.has_records && !line.starts_with(b"(") => {
+                    return Ok(Some(Err(problem)));
+                }
                 Some(_) => return Ok(Some(Err(Problem::Unterminated))),
             }
         }

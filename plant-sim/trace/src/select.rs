@@ -91,9 +91,15 @@ impl FromStr for Ids {
             });
         }
         let (first, last) = text.split_once('-').unwrap_or((text, text));
+        let end = |end| {
+            id(end).ok_or(
+                "allowed: up to 3 hexadecimal digits (11 bits, to 7FF) or 8 (29 bits, to 1FFFFFFF), a range of them (300-3FF), \
+                 or the name of a message",
+            )
+        };
         let ids = Self {
-            first: id(first)?,
-            last: id(last)?,
+            first: end(first)?,
+            last: end(last)?,
         };
         if is_extended(ids.first) != is_extended(ids.last) {
             return Err("one end of the range has 11 bits, the other 29".into());
@@ -105,24 +111,17 @@ impl FromStr for Ids {
     }
 }
 
-fn id(text: &str) -> Result<Id, String> {
+fn id(text: &str) -> Option<Id> {
     let digits = text.strip_prefix("0x").unwrap_or(text);
     // from_str_radix alone would also take a sign.
     let is_hex = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
-    let number = u32::from_str_radix(digits, 16).ok().filter(|_| is_hex);
-    let id = number.and_then(|raw| {
-        if digits.len() == 8 {
-            ExtendedId::new(raw).map(Id::Extended)
-        } else {
-            let raw = u16::try_from(raw).ok().filter(|_| digits.len() <= 3)?;
-            StandardId::new(raw).map(Id::Standard)
-        }
-    });
-    id.ok_or_else(|| {
-        "allowed: up to 3 hexadecimal digits (11 bits, to 7FF) or 8 (29 bits, to 1FFFFFFF), a range of them (300-3FF), \
-         or the name of a message"
-            .into()
-    })
+    let raw = u32::from_str_radix(digits, 16).ok().filter(|_| is_hex)?;
+    if digits.len() == 8 {
+        ExtendedId::new(raw).map(Id::Extended)
+    } else {
+        let raw = u16::try_from(raw).ok().filter(|_| digits.len() <= 3)?;
+        StandardId::new(raw).map(Id::Standard)
+    }
 }
 
 /// A time: seconds as in the trace, or relative to its first record with a leading `+`.

@@ -29,11 +29,12 @@ pub struct Gatherer {
     clock: Clock,
 }
 
-/// Time of a trace, which may jump forwards and back.
+/// Time of an interface or of the whole trace, which may jump forwards and back.
 #[derive(Clone, Copy, Default)]
 struct Clock {
-    first_us: Option<u64>,
-    newest_us: u64,
+    newest_us: Option<u64>,
+    /// Time that has passed: after a step back it counts on from there.
+    span_us: u64,
     /// Time in skipped steps.
     skipped_us: u64,
     skipped: u64,
@@ -42,30 +43,39 @@ struct Clock {
     largest_back_us: u64,
 }
 
+/// From one record to the next.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Step {
+    On,
+    Skipped,
+    Back,
+}
+
 impl Clock {
-    /// Takes the time of a record; `true` if the step before it is skipped.
-    fn tick(&mut self, time_us: u64, skip_us: u64) -> bool {
-        if self.first_us.is_none() {
-            (self.first_us, self.newest_us) = (Some(time_us), time_us);
-        }
-        let mut skips = false;
-        if let Some(step) = time_us.checked_sub(self.newest_us) {
-            self.largest_us = self.largest_us.max(step);
-            skips = step > skip_us;
-            if skips {
-                self.skipped_us += step;
-                self.skipped += 1;
-            }
-            self.newest_us = time_us;
-        } else {
+    /// Takes the time of a record.
+    fn tick(&mut self, time_us: u64, skip_us: u64) -> Step {
+        let newest_us = self.newest_us.replace(time_us).unwrap_or(time_us);
+        let Some(step) = time_us.checked_sub(newest_us) else {
             self.backwards += 1;
-            self.largest_back_us = self.largest_back_us.max(self.newest_us - time_us);
+            self.largest_back_us = self.largest_back_us.max(newest_us - time_us);
+            return Step::Back;
+        };
+        self.largest_us = self.largest_us.max(step);
+        if step > skip_us {
+            self.skipped_us = self.skipped_us.saturating_add(step);
+            self.skipped += 1;
+            return Step::Skipped;
         }
-        skips
+        self.span_us = self.span_us.saturating_add(step);
+        Step::On
     }
 
-    fn span_us(&self) -> u64 {
-        self.newest_us - self.first_us.unwrap_or(self.newest_us) - self.skipped_us
+    /// Takes the time of a record of an interface whose own clock made this step: one interface may be ahead of another
+    /// without any clock having been set.
+    fn follow(&mut self, time_us: u64, skip_us: u64, own: Step) {
+        if own == Step::Back || self.newest_us.is_none_or(|newest_us| newest_us <= time_us) {
+            self.tick(time_us, skip_us);
+        }
     }
 }
 
@@ -102,7 +112,6 @@ impl Gatherer {
 
     /// Adds the next record.
     pub fn record(&mut self, record: &Record) {
-        self.clock.tick(record.time_us, self.skip_us);
         let place = self
             .buses
             .iter()
@@ -111,24 +120,26 @@ impl Gatherer {
             self.buses.push((record.interface, Bus::default()));
             self.buses.len() - 1
         });
-        self.buses[place]
-            .1
-            .record(record, self.timing, self.skip_us);
+        let bus = &mut self.buses[place].1;
+        let step = bus.record(record, self.timing, self.skip_us);
+        self.clock.follow(record.time_us, self.skip_us, step);
     }
 
     /// The statistics of the records added.
     #[must_use]
     pub fn statistics(&self) -> Statistics {
         let buses = || self.buses.iter().map(|(_, bus)| bus);
+        let most = |of: fn(&Clock) -> u64| buses().map(|bus| of(&bus.clock)).max().unwrap_or(0);
         Statistics {
             frames: buses().map(Bus::frames).sum(),
             error_frames: buses().map(|bus| bus.error_frames).sum(),
-            backwards: self.clock.backwards,
+            backwards: buses().map(|bus| bus.clock.backwards).sum(),
             largest_step_s: self.clock.largest_us as f64 / 1e6,
-            largest_step_back_s: self.clock.largest_back_us as f64 / 1e6,
+            largest_step_back_s: most(|clock| clock.largest_back_us) as f64 / 1e6,
             skipped_steps: self.clock.skipped,
             skipped_s: self.clock.skipped_us as f64 / 1e6,
-            span_s: self.clock.span_us() as f64 / 1e6,
+            // With interfaces whose clocks differ, the trace is at least as long as each of them.
+            span_s: self.clock.span_us.max(most(|clock| clock.span_us)) as f64 / 1e6,
             bitrate: self.timing.nominal(),
             data_bitrate: self.timing.data(),
             interfaces: self
@@ -141,8 +152,9 @@ impl Gatherer {
 }
 
 impl Bus {
-    fn record(&mut self, record: &Record, timing: BitTiming, skip_us: u64) {
-        if self.clock.tick(record.time_us, skip_us) {
+    fn record(&mut self, record: &Record, timing: BitTiming, skip_us: u64) -> Step {
+        let step = self.clock.tick(record.time_us, skip_us);
+        if step == Step::Skipped {
             self.ids.values_mut().for_each(Tally::pause);
         }
         let frame = match &record.entry {
@@ -152,12 +164,12 @@ impl Bus {
                 for class in error.classes() {
                     *self.errors.entry(class).or_default() += 1;
                 }
-                return;
+                return step;
             }
         };
         let busy = timing.duration(FrameBits::exact(frame)).nanos();
         self.busy_ns += busy;
-        let window = self.clock.span_us() / WINDOW_US;
+        let window = self.clock.span_us / WINDOW_US;
         if window != self.window {
             (self.window, self.window_ns) = (window, 0);
         }
@@ -175,6 +187,7 @@ impl Bus {
                 tally.reset(nmt.node);
             }
         }
+        step
     }
 
     fn frames(&self) -> u64 {
@@ -182,7 +195,7 @@ impl Bus {
     }
 
     fn statistics(&self, name: Interface) -> BusStatistics {
-        let span_us = self.clock.span_us();
+        let span_us = self.clock.span_us;
         // A single instant has neither load nor rate.
         let over = |sum: u64, span: f64| if span == 0.0 { 0.0 } else { sum as f64 / span };
         let load = |busy_ns: u64| over(busy_ns, span_us as f64 * 1e3);
@@ -212,7 +225,7 @@ pub struct Statistics {
     pub frames: u64,
     /// Error frames reported by interfaces.
     pub error_frames: u64,
-    /// Records earlier than a previous one.
+    /// Records earlier than the one before on their interface, from which time counts on.
     pub backwards: u64,
     /// Longest time between two records, s.
     pub largest_step_s: f64,
@@ -222,7 +235,7 @@ pub struct Statistics {
     pub skipped_steps: u64,
     /// Time in them, s.
     pub skipped_s: f64,
-    /// From the first record to the last, less what was left out, s.
+    /// From the first record to the last, less what was left out and steps back, s.
     pub span_s: f64,
     /// Nominal bit rate that loads were computed for, bit/s.
     pub bitrate: u32,
@@ -230,6 +243,23 @@ pub struct Statistics {
     pub data_bitrate: u32,
     /// By interface, in the order in which they appear.
     pub interfaces: Vec<BusStatistics>,
+}
+
+impl Statistics {
+    /// The identifier most of whose periods were left out as gaps, and how often it came on average, s: what is left of
+    /// the time then says nothing about rates and loads.
+    #[must_use]
+    pub fn left_out(&self) -> Option<(&IdStatistics, f64)> {
+        if self.skipped_steps == 0 {
+            return None;
+        }
+        self.interfaces.iter().find_map(|bus| {
+            let id = bus.ids.iter().max_by_key(|id| id.frames)?;
+            let steps = id.frames.saturating_sub(1);
+            let all_s = bus.span_s + self.skipped_s;
+            (2 * id.periods() < steps).then_some((id, all_s / steps as f64))
+        })
+    }
 }
 
 /// Statistics of one interface.
@@ -243,7 +273,7 @@ pub struct BusStatistics {
     pub error_frames: u64,
     /// Error frames by class; one of several classes counts in each.
     pub errors: BTreeMap<String, u64>,
-    /// From its first record to its last, less what was left out, s.
+    /// From its first record to its last, less what was left out and steps back, s.
     pub span_s: f64,
     /// Share of the time for which the bus was busy, 0 to 1.
     pub load: f64,
@@ -283,6 +313,12 @@ pub struct IdStatistics {
 }
 
 impl IdStatistics {
+    /// Periods that were counted.
+    fn periods(&self) -> u64 {
+        let bins = self.period.iter().flat_map(|period| &period.histogram);
+        bins.map(|bin| bin.count).sum()
+    }
+
     /// Frames that a node does not use.
     #[must_use]
     pub fn bad(&self) -> u64 {

@@ -240,7 +240,6 @@ fn asc_of_other_tools_is_read() {
     assert_eq!(entries(log(named)), entries(log(text)));
 }
 
-/// The microseconds below the millisecond of the header are in the first time.
 /// What is damaged is counted; events of other kinds are passed over.
 #[test]
 fn asc_lines_that_are_cut_or_before_the_start_are_not_dropped() {
@@ -250,14 +249,25 @@ fn asc_lines_that_are_cut_or_before_the_start_are_not_dropped() {
         0.100000 1  123             Rx   d 2 00 11\n\
         -0.300000 1  125             Rx   d 2 00 11\n\
         0.400000 1  126\n\
+        0.500000\n\
+        0,600000 1  123             Rx   d 2 00 11\n\
+        0.700000 1  123             Xx   d 2 00 11\n\
+        0.800000 CANFD   x Rx        123   1 0 8  8 00 00 00 00 00 00 00 00\n\
+        0.900000 CANFD   1 Rx\n\
+        (1.000000) can0 123#00\n\
+        lorem ipsum\n\
+        // lorem ipsum\n\
+        no internal events logged\n\
+        \n\
         End TriggerBlock\n";
     let read = read(text.as_bytes());
-    assert_eq!(read.len(), 3, "{read:?}");
+    assert_eq!(read.len(), 10, "{read:?}");
     assert!(read[0].is_ok());
     let damaged = |line: &Result<Record, Problem>| matches!(line, Err(Problem::Asc(_)));
     assert!(read[1..].iter().all(damaged), "{read:?}");
 }
 
+/// The microseconds below the millisecond of the header are in the first time.
 #[test]
 fn asc_loses_no_microsecond() {
     let records = log("(1720000000.000475) can0 123#00\n(1720000000.100475) can0 123#00\n");
@@ -370,6 +380,8 @@ fn a_selection_takes_identifiers_interfaces_and_times() {
 fn what_is_not_read_is_named_with_its_converter() {
     for (bytes, tool) in [
         (&b"LOGG\x90\0\0\0"[..], "can.logconvert"),
+        (b"MDF     4.10", "can.logconvert FILE.mf4"),
+        (b";$FILEVERSION=1.1\n", "can.logconvert FILE.trc"),
         (&b"\xFF\xFE(\x001\0.\0"[..], "iconv -f UTF-16"),
         (b"\xD4\xC3\xB2\xA1\x02\0\x04\0", "editcap -F pcapng"),
     ] {

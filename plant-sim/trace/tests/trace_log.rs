@@ -230,6 +230,19 @@ fn a_message_names_line_fault_and_what_is_allowed() {
 }
 
 /// A line of 64 KiB costs no memory, and reading continues after it. The small buffer makes it span many fills.
+/// One line without an end is no log that was cut off, if it does not begin like one.
+#[test]
+fn a_foreign_file_of_one_line_is_not_a_log_that_was_cut_off() {
+    for text in ["{\"a\": 1}", "t12321122\rT0000012320011\r", "\u{1f}"] {
+        assert_eq!(problem(text), Problem::Timestamp, "{text}");
+    }
+    assert_eq!(problem("(1.0) can0 12"), Problem::Unterminated);
+    assert_eq!(
+        problem("base oct timestamps absolute\n"),
+        Problem::Asc("a base that is neither hex nor dec")
+    );
+}
+
 #[test]
 fn overlong_lines_are_refused_and_skipped() {
     let good = "(1.000000) can0 123#00\n";

@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use link::LinkAddress;
+use protocol::table::TABLE;
 use protocol::wire::BitTiming;
+use sim::text::nearest;
 use trace::Interface;
 use trace::convert::Target;
 use trace::select::{Ids, Moment, Selection};
@@ -19,7 +21,7 @@ pub(crate) struct InputArgs {
     /// candump log, candump's screen output, Vector ASC or pcapng, optionally gzipped; - for standard input.
     pub file: PathBuf,
     /// Only these identifiers: hexadecimal, 3 digits (11 bits) or 8 (29 bits), a range (300-3FF) or a message's name.
-    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    #[arg(long, value_name = "ID", value_delimiter = ',', value_parser = ids)]
     id: Vec<Ids>,
     /// Only these interfaces.
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = interface)]
@@ -46,6 +48,23 @@ pub(crate) struct EndArgs {
     /// Only up to this time: seconds as in the trace, or after its first record (+12.5).
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub to: Option<Moment>,
+}
+
+/// Identifiers; for a name that is nearly that of a message, that one.
+fn ids(text: &str) -> Result<Ids, String> {
+    text.parse().map_err(|allowed| {
+        let text = text.to_ascii_lowercase();
+        let names = TABLE.iter().map(|info| info.name);
+        let lower: Vec<_> = names.clone().map(str::to_ascii_lowercase).collect();
+        let near = nearest(&text, lower.iter().map(String::as_str));
+        match names
+            .into_iter()
+            .find(|name| near.is_some_and(|near| name.eq_ignore_ascii_case(near)))
+        {
+            Some(name) => format!("{allowed}; did you mean {name}?"),
+            None => allowed,
+        }
+    })
 }
 
 fn interface(text: &str) -> Result<Interface, String> {

@@ -11,6 +11,7 @@ use plant_sim::interrupt;
 use plant_sim::play::{Pace, PlayError, Player};
 use plant_sim::replay::Replay;
 use plant_sim::say;
+use protocol::table;
 use protocol::time::Period;
 use sim::model::RobotModel;
 use sim::rig::RigConfig;
@@ -24,6 +25,9 @@ use crate::cli::{Failure, show};
 
 /// A wait of the player worth mentioning.
 const LONG: Duration = Duration::from_secs(1);
+
+/// By how much the rate of samples may differ from the one asked for, relative to it.
+const UNLIKE: f64 = 0.02;
 
 /// Every interface is a bus of its own.
 type PerInterface<T> = BTreeMap<Interface, T>;
@@ -98,7 +102,9 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<(), Failure> {
         if source.counts(&record) {
             compared += replay.compared() - before;
             same.map_err(|difference| {
-                format!("{}: {difference}", place(&source, interface, &replays))
+                let place = place(&source, interface, &replays);
+                let hint = hint(args.rate, &replays[&interface]);
+                format!("{place}: {difference}\n{hint}")
             })?;
         }
     }
@@ -110,6 +116,26 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<(), Failure> {
         "{compared} commands are the same, byte for byte\n"
     ))?;
     Ok(())
+}
+
+/// What to do about a difference.
+fn hint(rate_hz: f64, replay: &Replay) -> String {
+    let this = env!("VERSION_AND_COMMIT");
+    match (replay.schema(), replay.rate_hz()) {
+        (Some(schema), _) if schema != table::HASH => format!(
+            "the trace is of nodes with schema {schema:08x}, with which the controller of this program ({this}), schema \
+             {:08x}, does not work: replay it with the version that recorded it",
+            table::HASH
+        ),
+        (_, Some(seen_hz)) if (seen_hz / rate_hz - 1.0).abs() > UNLIKE => format!(
+            "samples of this trace come at about {seen_hz:.0} Hz, and --rate is {rate_hz}: name the rate of the recorded \
+             controller"
+        ),
+        _ => format!(
+            "commands are compared with those of the controller of this program ({this}): if another version was recorded, \
+             replay with that one; if not, name its --model, --rate and --bitrate, or the trace lacks frames"
+        ),
+    }
 }
 
 fn play(args: &ReplayArgs, bus: &LinkAddress) -> Result<(), Failure> {

@@ -1,8 +1,6 @@
 //! Output of a subcommand.
 
-use std::fs;
 use std::io::{self, BufWriter, Write};
-use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 use plant_sim::output;
@@ -10,7 +8,7 @@ use trace::Record;
 
 use crate::cli::Failure;
 
-use super::source::{Source, input};
+use super::source::Source;
 
 /// Writes every selected record as it arrives.
 pub(super) trait Records {
@@ -32,22 +30,11 @@ pub(super) fn each(source: &mut Source, sink: &mut impl Records) -> io::Result<(
 
 /// Refuses an output that is the input.
 pub(super) fn refuse_same(file: &Path, out: Option<&Path>) -> Result<(), Failure> {
-    let Some(out) = out else {
-        return Ok(());
+    let input = match file {
+        file if file == Path::new("-") => Path::new("/dev/stdin"),
+        file => file,
     };
-    let data = (
-        input(file).and_then(|file| file.metadata()),
-        fs::metadata(out),
-    );
-    if let (Ok(file), Ok(other)) = data
-        && (file.dev(), file.ino()) == (other.dev(), other.ino())
-    {
-        return Err(Failure::usage(format!(
-            "--out {} is the trace itself; name another file",
-            out.display()
-        )));
-    }
-    Ok(())
+    Ok(output::distinct([input], out)?)
 }
 
 /// Writes to the file or to standard output. A reader of standard output that has closed the pipe (`| head`) is not an

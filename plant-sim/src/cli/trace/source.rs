@@ -32,6 +32,8 @@ const GZIP: &[u8] = b"\x1F\x8B";
 pub(super) struct Source {
     name: String,
     reader: Reader<BufReader<Box<dyn Read>>>,
+    /// Whether it is gzipped.
+    packed: bool,
     selection: Selection,
     /// Bytes read, and the total if known.
     bytes: Rc<Cell<u64>>,
@@ -113,6 +115,7 @@ impl Source {
         Ok(Self {
             name,
             reader: Reader::new(BufReader::with_capacity(1 << 16, input)),
+            packed,
             selection,
             bytes,
             size: Some(data.len()).filter(|&size| size > 0),
@@ -150,7 +153,12 @@ impl Source {
                 }
                 Err(ReadError::Line { problem, .. }) => return Some(Err(problem)),
                 Err(error @ ReadError::Io { .. }) => {
-                    self.failure = Some(format!("{}: {error}", self.name));
+                    let what = if self.packed {
+                        ", in a gzip file that is cut off or damaged from here on"
+                    } else {
+                        ""
+                    };
+                    self.failure = Some(format!("{}: {error}{what}", self.name));
                     return None;
                 }
             }
@@ -245,7 +253,7 @@ impl Source {
 }
 
 /// The file, or standard input for `-`: unbuffered, so that it can be waited for.
-pub(super) fn input(path: &Path) -> io::Result<File> {
+fn input(path: &Path) -> io::Result<File> {
     if path == Path::new("-") {
         io::stdin().as_fd().try_clone_to_owned().map(File::from)
     } else {

@@ -6,6 +6,15 @@ use protocol::frame::{CLASSICAL_MAX, CanFrame, FD_MAX, fd_length_of_dlc};
 use crate::line::{Problem, fd, id, timestamp};
 use crate::{Direction, Entry, ErrorFrame, Interface, Record};
 
+/// How lines without a time begin, in lower case: header, blocks of a trigger, comments.
+const HEADS: [&str; 6] = [
+    "internal events",
+    "no internal events",
+    "begin trigger",
+    "end trigger",
+    "previous log file",
+    "//",
+];
 /// Class for an error frame, of which ASC gives no details (`CAN_ERR_BUSERROR`, as in can-utils).
 const BUS_ERROR: u32 = 0x80;
 
@@ -27,7 +36,7 @@ impl Asc {
         line.starts_with(b"date ") || line.starts_with(b"base ")
     }
 
-    /// Record of a line, if it is one; headers, statistics and events of other kinds are not.
+    /// Record of a line, if it is one; headers, statistics and events of other kinds are not. What is neither is damaged.
     pub(super) fn line(&mut self, line: &[u8]) -> Option<Result<Record, Problem>> {
         let text = String::from_utf8_lossy(line);
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
@@ -40,11 +49,15 @@ impl Asc {
             ["base", base, rest @ ..] => {
                 self.decimal = *base == "dec";
                 self.relative = rest.contains(&"relative");
-                None
+                let is_known = ["dec", "hex"].contains(base);
+                (!is_known).then_some(Err(Problem::Asc("a base that is neither hex nor dec")))
             }
             [time, rest @ ..] if time.starts_with(|c: char| c.is_ascii_digit()) => {
                 let time_us = match timestamp(time.as_bytes()) {
                     Ok(time_us) => time_us,
+                    Err(Problem::Timestamp) => {
+                        return Some(Err(Problem::Asc("no time such as 0.012345 at the start")));
+                    }
                     Err(problem) => return Some(Err(problem)),
                 };
                 self.now_us = if self.relative {
@@ -60,7 +73,13 @@ impl Asc {
             {
                 Some(Err(Problem::Asc("a time before the start")))
             }
-            _ => None,
+            [] => None,
+            _ => {
+                let line = text.trim_start().to_lowercase();
+                (!HEADS.iter().any(|head| line.starts_with(head))).then_some(Err(Problem::Asc(
+                    "neither a time nor a line of the header at the start",
+                )))
+            }
         }
     }
 
@@ -70,12 +89,13 @@ impl Asc {
             _ => (false, words),
         };
         let [channel, rest @ ..] = words else {
-            return None;
+            return Some(Err(Problem::Asc("nothing after the time")));
         };
-        let channel = channel
-            .parse()
-            .ok()
-            .filter(|&channel: &usize| channel > 0)?;
+        let channel = channel.parse().ok().filter(|&channel: &usize| channel > 0);
+        let Some(channel) = channel else {
+            // Only frames and their like begin with a channel.
+            return fd.then_some(Err(Problem::Asc("no channel, counted from 1, after CANFD")));
+        };
         let record = |direction, entry| Record {
             time_us,
             interface: Interface::numbered(channel - 1),
@@ -94,13 +114,19 @@ impl Asc {
             (false, [cut]) if self.id(cut).is_ok() => {
                 return Some(Err(Problem::Asc("nothing after the identifier")));
             }
+            (true, _) => return Some(Err(Problem::Asc("no direction and identifier"))),
             _ => return None,
         };
         let direction = match *way {
             // Also written where the direction is unknown.
             "Rx" => None,
             "Tx" => Some(Direction::Transmitted),
-            // A request to send (TxRq), followed by the frame itself, and statistics.
+            // A request to send, followed by the frame itself.
+            "TxRq" => return None,
+            _ if fd || self.id(id).is_ok() => {
+                return Some(Err(Problem::Asc("no direction; Rx, Tx or TxRq is allowed")));
+            }
+            // Statistics and the like.
             _ => return None,
         };
         let frame = if fd {

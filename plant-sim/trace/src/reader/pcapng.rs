@@ -96,12 +96,12 @@ impl Pcapng {
             return Ok(None);
         }
         let mut head = [0; 8];
-        source.read_exact(&mut head)?;
+        source.read_exact(&mut head).map_err(cut)?;
         let [a, b, c, d, length @ ..] = head;
         let mut begun = Vec::new();
         if [a, b, c, d] == SECTION_HEADER.to_le_bytes() {
             let mut magic = [0; 4];
-            source.read_exact(&mut magic)?;
+            source.read_exact(&mut magic).map_err(cut)?;
             self.big_endian = magic == BYTE_ORDER_MAGIC.to_be_bytes();
             if !self.big_endian && magic != BYTE_ORDER_MAGIC.to_le_bytes() {
                 return Err(broken("wrong byte order mark"));
@@ -263,6 +263,16 @@ fn entry(bytes: &[u8]) -> Option<Result<Entry, Problem>> {
         CanFrame::classical(id, data.get(..len)?).ok_or(Problem::Packet("too many bytes"))
     };
     Some(frame.map(Entry::Frame))
+}
+
+/// Says in words that the file ends too early.
+fn cut(error: io::Error) -> io::Error {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => {
+            io::Error::new(error.kind(), "the file was cut off within a block")
+        }
+        _ => error,
+    }
 }
 
 fn broken(what: &'static str) -> io::Error {

@@ -22,7 +22,7 @@ impl fmt::Display for Statistics {
         if self.backwards > 0 {
             writeln!(
                 f,
-                "{} records are earlier than a previous one, by up to {:.6} s",
+                "{} records are earlier than the one before, by up to {:.6} s; time counts on from there",
                 self.backwards, self.largest_step_back_s
             )?;
         }
@@ -53,6 +53,12 @@ impl fmt::Display for BusStatistics {
             self.load * 100.0,
             self.peak_load * 100.0
         )?;
+        if self.load.max(self.peak_load) > 1.0 {
+            writeln!(
+                f,
+                "no bus carries more than 100 %: --bitrate is not its rate, or times and frames of this trace are not those of one bus"
+            )?;
+        }
         if self.error_frames > 0 {
             let classes: Vec<String> = self
                 .errors
