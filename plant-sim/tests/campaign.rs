@@ -76,6 +76,13 @@ impl Bench {
         let arguments = ["run", "plan.jsonl", "--shard", shard, "--out", out];
         let output = self.try_it(&[&arguments[..], more].concat());
         assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
+        let shown = String::from_utf8_lossy(&output.stdout);
+        let (part, of) = shard.split_once('/').unwrap();
+        let file = format!("{out}/results-{part}-of-{of}.jsonl");
+        assert!(
+            shown.contains(" cases run, ") && shown.contains(&file),
+            "{shown}"
+        );
     }
 
     fn refused(&self, arguments: &[&str], why: &str) {

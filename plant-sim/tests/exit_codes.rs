@@ -86,6 +86,76 @@ fn done_is_0() {
     }
 }
 
+/// Whatever a command has to show, a full disk at its standard output is an error.
+#[test]
+fn output_that_cannot_be_written_is_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = ["run", "--cycles", "1", "--quiet"];
+    let recorded = Command::new(env!("CARGO_BIN_EXE_plant-sim"))
+        .args(run)
+        .current_dir(folder.path())
+        .status();
+    assert!(recorded.unwrap().success());
+    let log = "out/trace.log";
+    for shows in [
+        &["--help"][..],
+        &["--version"],
+        &["help", "run"],
+        &["trace", "stats", "--help"],
+        &["completions", "fish"],
+        &["man"],
+        &["schema", "plan"],
+        &["schema", "plan", "--markdown"],
+        &["parameters", "--markdown"],
+        &["dbc"],
+        &["dissector"],
+        &["model"],
+        &["check"],
+        &["check", "--json"],
+        &["run", "--cycles", "1", "--out", "other"],
+        &["trace", "check", log],
+        &["trace", "decode", log],
+        &["trace", "stats", log],
+        &["trace", "plot", log],
+        &["trace", "convert", log, "--to", "pcapng"],
+        &["campaign", "plan", "--count", "2"],
+    ] {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_plant-sim"))
+            .args(shows)
+            .current_dir(folder.path())
+            .stdout(full)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{shows:?}: {said}");
+        assert!(said.contains("cannot write to standard output"), "{said}");
+    }
+}
+
+/// A refusal is a result of a check, for a program as well.
+#[test]
+fn what_a_check_refuses_is_in_its_json() {
+    let arguments = ["check", "--json", "--set", "cycle[0].jump.top=-0.29"];
+    let output = plant_sim(&arguments);
+    assert_eq!(output.status.code(), Some(1));
+    let plan: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let refused = &plan["refused"][0];
+    assert_eq!(
+        (&refused["cycle"], &refused["step"]),
+        (&1.into(), &"cycle[0].jump".into())
+    );
+    assert!(
+        refused["reason"]
+            .as_str()
+            .unwrap()
+            .contains("parameter top")
+    );
+    let plan: serde_json::Value =
+        serde_json::from_slice(&plant_sim(&["check", "--json"]).stdout).unwrap();
+    assert_eq!(plan["refused"], serde_json::json!([]));
+}
+
 #[test]
 fn a_run_or_check_that_failed_is_1() {
     // Ten times the friction and the weight end in a fault.

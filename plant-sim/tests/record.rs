@@ -160,6 +160,8 @@ fn an_adapter_that_goes_leaves_its_frames() {
             .unwrap()
             .contains("has closed the connection")
     );
+    let shown = String::from_utf8(output.stdout).unwrap();
+    assert!(shown.starts_with("1 frames and 0 error frames"), "{shown}");
     assert_eq!(entries(&out), ["can0 123#"]);
 }
 

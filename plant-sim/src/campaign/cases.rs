@@ -71,7 +71,7 @@ pub fn load(file: Option<&Path>) -> Result<Crossing, CampaignError> {
     let Some(path) = file else {
         return Ok(crossing(DEFAULT).expect("the cases of the program are valid"));
     };
-    let text = std::fs::read_to_string(path).map_err(CampaignError::read(path))?;
+    let text = crate::input::text(path).map_err(CampaignError::read(path))?;
     crossing(&text).map_err(|what| CampaignError::wrong(path, what))
 }
 
@@ -135,7 +135,13 @@ fn micros(key: &str, ms: f64) -> Result<u64, String> {
     if (0.0..=1e6).contains(&ms) {
         Ok((ms * 1e3).round() as u64)
     } else {
-        Err(format!("{key} is {ms}; allowed: 0 to 1000000 ms"))
+        // Not as three hundred digits.
+        let found = if ms.abs() < 1e15 {
+            ms.to_string()
+        } else {
+            format!("{ms:e}")
+        };
+        Err(format!("{key} is {found}; allowed: 0 to 1000000 ms"))
     }
 }
 

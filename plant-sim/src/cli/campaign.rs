@@ -170,9 +170,16 @@ fn work(args: &RunArgs) -> Result<(), Failure> {
     };
     let plan = Plan::open(&args.plan)?;
     let done = work::work(&plan, shard, jobs, args.resume, &args.out)?;
+    let out = args.out.display();
+    show(&format!(
+        "{} cases run, {} missed a requirement; the results are in {}: plant-sim campaign merge {out} | plant-sim campaign report -\n",
+        done.cases,
+        done.missed,
+        args.out.join(shard.file()).display()
+    ))?;
     if done.missed > 0 {
         return Err(Failure::failed(format!(
-            "{} of {} cases missed a requirement; plant-sim campaign merge and report say which",
+            "{} of {} cases missed a requirement",
             done.missed, done.cases
         )));
     }

@@ -27,6 +27,7 @@ mod what_if;
 use std::io::{self, Write as _};
 
 use clap::{CommandFactory as _, Parser, Subcommand};
+use terminal::only_shown;
 
 pub(crate) use failure::Failure;
 
@@ -41,6 +42,8 @@ const EXIT_CODES: &str = "Exit codes: 0 done; 1 the run or check failed; 2 wrong
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    #[arg(long, value_name = "NAME|FILE", default_value = run::USUAL, help = run::what())]
+    scenario: String,
     #[command(flatten)]
     run: run::RunArgs,
 }
@@ -94,16 +97,22 @@ enum Command {
 
 /// Executes the command line. An error is one message for the user.
 pub(crate) fn main() -> u8 {
-    match command(Cli::parse()) {
-        Ok(()) => 0,
-        Err(failure) => failure.report(),
+    match Cli::try_parse().map(command) {
+        Ok(Ok(())) => 0,
+        Ok(Err(failure)) => failure.report(),
+        Err(help) => only_shown(
+            "plant-sim",
+            help.exit_code(),
+            help.print(),
+            help.use_stderr(),
+        ),
     }
 }
 
 fn command(cli: Cli) -> Result<(), Failure> {
     match cli.command {
-        None => run::run(&cli.run),
-        Some(Command::Run(args)) => run::run(&(*args).into()),
+        None => run::run(&cli.scenario, &cli.run),
+        Some(Command::Run(args)) => run::run(args.scenario.name(), &args.run),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::Campaign(command)) => campaign::run(&command),
         Some(Command::Cost(args)) => cost::run(&args),
@@ -128,7 +137,11 @@ fn command(cli: Cli) -> Result<(), Failure> {
 
 /// Writes to standard output. A reader that has closed the pipe (`| head`) is not an error.
 fn show(text: &str) -> Result<(), Failure> {
-    match io::stdout().lock().write_all(text.as_bytes()) {
+    let mut output = io::stdout().lock();
+    match output
+        .write_all(text.as_bytes())
+        .and_then(|()| output.flush())
+    {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(format!("cannot write to standard output: {error}").into())
         }

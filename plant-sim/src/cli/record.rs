@@ -44,7 +44,6 @@ pub(super) fn run(args: &RecordArgs) -> Result<(), Failure> {
     let ended = record(&mut link, &args.bus, &mut recording);
     // However it ended, the recording gets its name.
     let recorded = recording.finish().map_err(|error| error.to_string())?;
-    let lost = ended?;
     show(&format!(
         "{} frames and {} error frames in {:.3} s, {} bytes in {} files\n",
         recorded.frames,
@@ -53,6 +52,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<(), Failure> {
         recorded.bytes,
         recorded.files,
     ))?;
+    let lost = ended?;
     if lost > 0 {
         return Err(Failure::failed(format!(
             "{}: {lost} frames are not in the recording: they came faster than they were read, or could not be read",

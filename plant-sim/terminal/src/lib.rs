@@ -6,11 +6,13 @@
 #![forbid(unsafe_code)]
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
+mod arguments;
 mod guard;
 
 use std::fmt::Arguments;
 use std::io::{self, Write as _};
 
+pub use arguments::only_shown;
 pub use guard::guard;
 
 /// A run or a check failed, or the machine did not allow it.

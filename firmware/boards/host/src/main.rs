@@ -19,7 +19,7 @@ use firmware::control::controller::Config;
 use firmware::mechanics::arm::{ArmModel, IRB_930};
 use link::{Link, LinkAddress, realtime};
 use protocol::time::Period;
-use terminal::{FAILED, USAGE, guard, say};
+use terminal::{FAILED, USAGE, guard, only_shown, say};
 
 use crate::clock::Clock;
 use crate::shell::Shell;
@@ -68,12 +68,18 @@ impl Failure {
 }
 
 fn main() -> ExitCode {
-    let work = || match run(&Args::parse()) {
-        Ok(()) => 0,
-        Err(Failure { message, code }) => {
+    let work = || match Args::try_parse().map(|args| run(&args)) {
+        Ok(Ok(())) => 0,
+        Ok(Err(Failure { message, code })) => {
             say!("controller: {message}");
             code
         }
+        Err(help) => only_shown(
+            "controller",
+            help.exit_code(),
+            help.print(),
+            help.use_stderr(),
+        ),
     };
     ExitCode::from(guard("controller", env!("VERSION_AND_COMMIT"), work))
 }
