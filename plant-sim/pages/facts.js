@@ -20,7 +20,7 @@ function facts({ results }) {
         ["Peak torque over limit", share(results.torque_utilisation)],
         ["RMS torque over continuous rating", share(results.thermal_utilisation)],
         ["Peak speed over limit", share(results.speed_utilisation)],
-        ["Bus", `${(100 * results.bus_load).toFixed(1)} % load, ${results.frames} frames, ${results.frames_lost} lost, ${results.overruns} commands late`],
+        ["Bus", `${(100 * results.bus_load).toFixed(1)} % load, ${results.frames} frames, ${results.frames_lost} lost, ${results.overruns} commands late${results.bus_errors ? `, ${results.bus_errors} errors` : ""}`],
         ["Simulated time", `${digits(results.sim_time_s)} s`],
         ["SHA-256 of trace.log", results.trace_sha256],
         ["Program", results.version ? `plant-sim ${results.version} (${results.commit})` : "this page"],

@@ -20,10 +20,11 @@ use nalgebra::Vector4;
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{Feedback, Message};
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 use sim::model::{Geometry, RobotModel};
 use sim::observer::{Observer, Truth};
-use trace::{Entry, Interface, Record};
+use sim::record::of_run;
+use trace::{Entry, ErrorFrame, Interface, Record};
 
 use messages::{can_frame, joint_states, transforms};
 
@@ -157,12 +158,11 @@ impl<W: Write> Recorder<W> {
 /// A run as it goes: the trace, and what no frame says, the actual motion and its reference.
 impl<W: Write> Observer for Recorder<W> {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
-        self.record(&Record {
-            time_us: time.micros(),
-            interface: Interface::CAN0,
-            direction: None,
-            entry: Entry::Frame(*frame),
-        })
+        self.record(&of_run(time, Entry::Frame(*frame)))
+    }
+
+    fn error(&mut self, time: Instant, error: &ErrorFrame, _: Duration) -> io::Result<()> {
+        self.record(&of_run(time, Entry::Error(*error)))
     }
 
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {

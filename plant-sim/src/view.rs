@@ -21,9 +21,10 @@ use std::sync::mpsc::{SyncSender, TrySendError};
 use std::{collections::VecDeque, io};
 
 use protocol::frame::CanFrame;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 use sim::observer::Observer;
-use trace::{Entry, Interface, Record};
+use sim::record::of_run;
+use trace::{Entry, ErrorFrame, Record};
 
 pub use air::Air;
 pub use scribe::{Scribe, Subject};
@@ -118,12 +119,12 @@ impl Ear {
 
 impl Observer for Ear {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
-        self.record(Record {
-            time_us: time.micros(),
-            interface: Interface::CAN0,
-            direction: None,
-            entry: Entry::Frame(*frame),
-        });
+        self.record(of_run(time, Entry::Frame(*frame)));
+        Ok(())
+    }
+
+    fn error(&mut self, time: Instant, error: &ErrorFrame, _: Duration) -> io::Result<()> {
+        self.record(of_run(time, Entry::Error(*error)));
         Ok(())
     }
 }

@@ -4,55 +4,46 @@
 //! time of the next event from [`BuiltinBus::next_event`], and takes received frames with [`BuiltinBus::pop_delivery`].
 //!
 //! Modelled: exact frame lengths, arbitration bit by bit, non-preemption, interframe space, transmit mailboxes,
-//! identifier collisions. Not modelled: propagation delay, oscillator tolerance, error frames of other causes and error
-//! counters; errors of a node are injected by wrappers around its [`Peer`](crate::peer::Peer).
+//! identifier collisions; errors of ISO 11898-1 with error frames, error counters, retransmission, bus-off and recovery,
+//! where a [`Disturbance`] causes them or nobody acknowledges. Not modelled: propagation delay, oscillator tolerance,
+//! overload frames, disturbed error flags. What goes wrong inside a node is injected by wrappers around its
+//! [`Peer`](crate::peer::Peer).
 
+mod anatomy;
+mod counters;
+mod course;
+mod disturbance;
 mod load;
-
-use std::collections::BTreeMap;
+mod node;
+mod nodes;
+mod report;
+mod settle;
+mod statistics;
 
 use protocol::bus::TransmitError;
-use protocol::frame::{CanFrame, Id};
+use protocol::frame::CanFrame;
 use protocol::time::{Duration, Instant};
-use protocol::wire::{BitTiming, FrameBits, arbitration_field};
+use protocol::wire::{BitTiming, FrameBits, INTERMISSION, arbitration_field};
 
+use anatomy::Anatomy;
+use course::{Course, Flagged, Reader};
+use disturbance::{Hit, Interference};
+use node::{Mailbox, Node, OCCURRENCE};
+
+pub use anatomy::Field;
+pub use counters::{Counters, Rule, State};
+pub use disturbance::{Disturbance, Disturbed, ErrorKind};
 pub use load::{MAX_LOAD, Overload, Traffic, admit, worst_case_load};
+pub use nodes::{NodeId, NodeSet};
+pub use report::{Noticed, Report};
+pub use statistics::{Carried, Collision, Statistics};
 
-/// Cost of an identifier collision besides the frames themselves: superposed error flags (6 to 12 bits) and error
-/// delimiter (8).
-const ERROR_FRAME: FrameBits = FrameBits {
-    nominal: 12 + 8,
-    data: 0,
-};
+/// Recessive bits that end an error frame.
+const DELIMITER: u32 = 8;
+/// Error flags of a collision, superposed: 6 to 12 bits.
+const COLLISION_FLAGS: u32 = 12;
 
-/// A node of one bus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NodeId(usize);
-
-/// Some nodes of one bus.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NodeSet(u64);
-
-impl NodeSet {
-    /// Whether the node is one of them.
-    #[must_use]
-    pub fn contains(self, node: NodeId) -> bool {
-        self.0 & 1 << node.0 != 0
-    }
-
-    /// The nodes, in the order they were attached.
-    pub fn iter(self) -> impl Iterator<Item = NodeId> {
-        (0..BuiltinBus::MAX_NODES)
-            .map(NodeId)
-            .filter(move |&node| self.contains(node))
-    }
-
-    fn insert(&mut self, node: usize) {
-        self.0 |= 1 << node;
-    }
-}
-
-/// A frame that arrived at every node but its sender.
+/// A frame that has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delivery {
     /// When receivers accepted it as valid: sample point of the last but one bit of end of frame.
@@ -63,107 +54,50 @@ pub struct Delivery {
     pub frame: CanFrame,
     /// The sender; several if nodes sent identical frames at the same instant, which CAN merges into one.
     pub from: NodeSet,
+    /// Who received it: every other node that is not bus-off, unless it has read something else.
+    pub to: NodeSet,
 }
 
-/// Nodes that started different frames with one identifier at the same instant.
-///
-/// Arbitration cannot separate them, and a bit error follows. Real controllers repeat both frames and collide until
-/// both are bus-off; here both frames are lost at once. Two nodes with the same identifier are a configuration error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Collision {
-    /// When the frames started.
-    pub start: Instant,
-    /// Their identifier.
-    pub id: Id,
-    /// The nodes that sent them.
-    pub nodes: NodeSet,
+/// What happens next on the bus, as far as known.
+enum Next {
+    Transmission(Transmission),
+    /// This node takes part again.
+    Recovery(Instant, usize),
 }
 
-/// Traffic of one identifier, or of all.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Carried {
-    /// Frames received.
-    pub frames: u64,
-    /// Time they took, including interframe space.
-    pub busy: Duration,
-    /// Longest wait from [`BuiltinBus::enqueue`] to the start of frame.
-    pub max_wait: Duration,
-}
-
-impl Carried {
-    /// Share of `elapsed` for which the bus was busy, 0 to 1.
-    #[must_use]
-    pub fn load(&self, elapsed: Duration) -> f64 {
-        self.busy.nanos() as f64 / elapsed.nanos().max(1) as f64
-    }
-
-    fn add(&mut self, busy: Duration, wait: Duration) {
-        self.frames += 1;
-        self.busy += busy;
-        self.max_wait = self.max_wait.max(wait);
-    }
-}
-
-/// Statistics of the bus since its creation.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Statistics {
-    /// All frames together.
-    pub total: Carried,
-    /// By identifier, in the order of arbitration.
-    pub by_id: BTreeMap<Id, Carried>,
-    /// Frames refused because every mailbox of their node was occupied.
-    pub refused: u64,
-    /// Identifier collisions.
-    pub collisions: u64,
-    /// The first of them.
-    pub first_collision: Option<Collision>,
-}
-
-/// Frame in a transmit mailbox.
-struct Mailbox {
-    arbitration: u32,
-    frame: CanFrame,
-    queued: Instant,
-    duration: Duration,
-}
-
-/// A node's CAN controller, from the bus's side.
-struct Node {
-    capacity: usize,
-    /// In the order of filling.
-    mailboxes: Vec<Mailbox>,
-}
-
-impl Node {
-    /// The mailbox that takes part in an arbitration at `start`: the highest priority, and the oldest per identifier.
-    fn candidate(&self, start: Instant) -> Option<(usize, &Mailbox)> {
-        self.mailboxes
-            .iter()
-            .enumerate()
-            .filter(|(_, mailbox)| mailbox.queued <= start)
-            .min_by_key(|(_, mailbox)| mailbox.arbitration)
-    }
-}
-
-/// The next transmission, as far as known.
+/// An attempt to send a frame.
 struct Transmission {
     start: Instant,
-    valid: Instant,
+    /// When it is known what becomes of it: the frame is valid, or an error flag begins.
+    end: Instant,
     idle: Instant,
+    frame: CanFrame,
     from: NodeSet,
     collides: bool,
+    /// Where anything is wrong with it.
+    trouble: Option<Trouble>,
+}
+
+/// What is wrong with an attempt.
+struct Trouble {
+    hit: Option<Hit>,
+    /// Nodes that take part, in the order of the course's readers.
+    readers: Vec<(usize, Reader)>,
+    course: Course,
 }
 
 /// The bus and the transmit side of its nodes' controllers.
 ///
 /// A controller sends its mailboxes in the order of their priority (as bxCAN by default, M_CAN in queue mode), frames
 /// of one identifier in the order of arrival: a FIFO would let a heartbeat delay a command. A mailbox is free again
-/// once its frame is valid for the receivers.
+/// once its frame is valid for the receivers; until then the frame is sent again and again.
 pub struct BuiltinBus {
     timing: BitTiming,
     nodes: Vec<Node>,
     /// End of the last intermission; no frame starts earlier.
     idle: Instant,
+    interference: Interference,
+    reports: Vec<Report>,
     statistics: Statistics,
 }
 
@@ -178,6 +112,8 @@ impl BuiltinBus {
             timing,
             nodes: Vec::new(),
             idle: Instant::ORIGIN,
+            interference: Interference::default(),
+            reports: Vec::new(),
             statistics: Statistics::default(),
         }
     }
@@ -187,16 +123,48 @@ impl BuiltinBus {
     /// # Panics
     /// Above [`Self::MAX_NODES`] nodes.
     pub fn attach(&mut self, mailboxes: usize) -> NodeId {
+        self.add(Node::new(mailboxes, false))
+    }
+
+    /// Adds a node that neither acknowledges frames nor destroys wrong ones: an analyser in listen-only mode, which can
+    /// send all the same.
+    ///
+    /// # Panics
+    /// As [`Self::attach`].
+    pub fn attach_listener(&mut self, mailboxes: usize) -> NodeId {
+        self.add(Node::new(mailboxes, true))
+    }
+
+    fn add(&mut self, node: Node) -> NodeId {
         assert!(
             self.nodes.len() < Self::MAX_NODES,
             "a bus has at most {} nodes",
             Self::MAX_NODES
         );
-        self.nodes.push(Node {
-            capacity: mailboxes,
-            mailboxes: Vec::with_capacity(mailboxes),
-        });
+        self.nodes.push(node);
         NodeId(self.nodes.len() - 1)
+    }
+
+    /// Adds a disturbance, with random numbers from `seed`.
+    pub fn disturb(&mut self, disturbance: Disturbance, seed: u64) {
+        self.interference.add(disturbance, seed);
+    }
+
+    /// From `from` until `until` nobody tells the controller of this node to recover once it is bus-off.
+    ///
+    /// # Panics
+    /// With a node of another bus.
+    pub fn leave_off(&mut self, node: NodeId, from: Instant, until: Instant) {
+        self.nodes[node.0].unattended.push((from, until));
+    }
+
+    /// Error counters of a node.
+    ///
+    /// # Panics
+    /// With a node of another bus.
+    #[must_use]
+    pub fn counters(&self, node: NodeId) -> Counters {
+        self.nodes[node.0].counters
     }
 
     /// Puts a frame into a mailbox of `node` at `now`.
@@ -230,27 +198,40 @@ impl BuiltinBus {
         Ok(())
     }
 
-    /// End of the current or next transmission, unless frames queued by then win arbitration; `None` when there is
-    /// nothing to send.
+    /// End of the current or next attempt to send, unless frames queued by then win arbitration, or of a recovery from
+    /// bus-off; `None` when nothing will happen.
     #[must_use]
     pub fn next_event(&self) -> Option<Instant> {
-        self.next_transmission().map(|next| next.valid)
+        Some(match self.next()? {
+            Next::Transmission(next) => next.end,
+            Next::Recovery(time, _) => time,
+        })
     }
 
     /// The oldest frame received at or before `until` and not yet taken.
     ///
-    /// By calling it the caller promises to queue nothing more before `until`.
+    /// By calling it the caller promises to queue nothing more before `until`. A frame that nobody acknowledges is sent
+    /// for as long as that.
     pub fn pop_delivery(&mut self, until: Instant) -> Option<Delivery> {
-        // Every round empties a mailbox.
         loop {
-            let next = self.next_transmission()?;
-            if next.valid > until {
-                return None;
-            }
-            if let Some(delivery) = self.complete(&next) {
-                return Some(delivery);
+            match self.next()? {
+                Next::Transmission(next) if next.end <= until => {
+                    if let Some(delivery) = self.complete(&next) {
+                        return Some(delivery);
+                    }
+                }
+                Next::Recovery(time, node) if time <= until => {
+                    self.nodes[node].recover(time);
+                    self.report(time, node, Noticed::Recovered, Duration::ZERO);
+                }
+                _ => return None,
             }
         }
+    }
+
+    /// What nodes have reported since the last call, in the order of time.
+    pub fn reports(&mut self) -> impl Iterator<Item = Report> + use<> {
+        std::mem::take(&mut self.reports).into_iter()
     }
 
     /// Statistics so far. A frame counts once it is taken.
@@ -259,18 +240,32 @@ impl BuiltinBus {
         &self.statistics
     }
 
+    fn next(&self) -> Option<Next> {
+        let occurrence = self.bits(OCCURRENCE);
+        let recovery = (self.nodes.iter().enumerate())
+            .filter_map(|(index, node)| Some((node.recovers(occurrence)?, index)))
+            .min();
+        let transmission = self.next_transmission();
+        match (recovery, transmission) {
+            (Some((time, node)), next) if next.as_ref().is_none_or(|next| time <= next.start) => {
+                Some(Next::Recovery(time, node))
+            }
+            (_, next) => next.map(Next::Transmission),
+        }
+    }
+
+    /// Duration of nominal bits.
+    fn bits(&self, nominal: u32) -> Duration {
+        self.timing.duration(FrameBits { nominal, data: 0 })
+    }
+
     /// Arbitration among the frames queued so far.
     ///
     /// A frame in transmission needs no state: frames queued after its start are not candidates, so the answer stays
     /// the same until it is complete.
     fn next_transmission(&self) -> Option<Transmission> {
-        let oldest = self
-            .nodes
-            .iter()
-            .flat_map(|node| &node.mailboxes)
-            .map(|mailbox| mailbox.queued)
-            .min()?;
-        let start = oldest.max(self.idle);
+        let earliest = |node: &Node| node.earliest(self.idle);
+        let start = self.nodes.iter().filter_map(earliest).min()?;
         let candidates = || {
             self.nodes
                 .iter()
@@ -291,52 +286,113 @@ impl BuiltinBus {
         }
         if collides {
             // An upper bound: the longest frame in full, as if the last bit were the first to differ.
-            duration += self.timing.duration(ERROR_FRAME);
+            duration += self.bits(COLLISION_FLAGS + DELIMITER);
         }
-        let idle = start + duration;
-        Some(Transmission {
+        let mut next = Transmission {
             start,
-            valid: start + duration.saturating_sub(self.timing.after_valid()),
-            idle,
+            end: start + duration.saturating_sub(self.timing.after_valid()),
+            idle: start + duration,
+            frame: winner.frame,
             from,
             collides,
+            trouble: None,
+        };
+        if !collides {
+            next.trouble = self.trouble(start, &winner.frame, from);
+        }
+        if let Some((flagged, flags)) = next.trouble.as_ref().and_then(|it| it.course.destroyed) {
+            let anatomy = Anatomy::of(&winner.frame);
+            let bits = anatomy.until(match flagged {
+                Flagged::Bit(index) => index,
+                Flagged::Field(field) => anatomy.first(field),
+            });
+            next.end = start + self.timing.duration(bits);
+            next.idle = next.end + self.bits(flags + DELIMITER + INTERMISSION);
+        }
+        Some(next)
+    }
+
+    /// What is wrong with an attempt to send `frame`, if anything is.
+    fn trouble(&self, start: Instant, frame: &CanFrame, from: NodeSet) -> Option<Trouble> {
+        let others = || {
+            let part = |(index, node): &(usize, &Node)| {
+                node.takes_part() && !from.contains(NodeId(*index))
+            };
+            self.nodes.iter().enumerate().filter(part)
+        };
+        let calm = !self.interference.acts(start);
+        if calm && others().next().is_some() {
+            return None;
+        }
+        let hit = self.interference.hit(start, frame);
+        let for_all = hit.is_some_and(|hit| hit.kind == ErrorKind::Crc);
+        let reader = |(index, node): (usize, &Node)| {
+            let reader = Reader {
+                state: node.counters.state(),
+                misreads: for_all || self.interference.misleads(start, NodeId(index)),
+            };
+            (index, reader)
+        };
+        let readers: Vec<_> = others().map(reader).collect();
+        let senders = from.iter().map(|node| self.counters(node).state());
+        let course = course::course(
+            senders.min().unwrap_or(State::ErrorActive),
+            &readers
+                .iter()
+                .map(|(_, reader)| *reader)
+                .collect::<Vec<_>>(),
+            hit.filter(|_| !for_all),
+        );
+        Some(Trouble {
+            hit,
+            readers,
+            course,
         })
     }
 
-    /// Empties the senders' mailboxes and updates the statistics; returns the frame unless it collided.
-    fn complete(&mut self, sent: &Transmission) -> Option<Delivery> {
-        self.idle = sent.idle;
-        let mut frame = None;
+    /// Empties the senders' mailboxes if the frame was sent, counts and reports; returns the frame if it was received.
+    fn complete(&mut self, next: &Transmission) -> Option<Delivery> {
+        let Transmission {
+            start, idle, from, ..
+        } = *next;
+        self.idle = idle;
+        let course = next.trouble.as_ref().map(|it| &it.course);
+        let sent = course.is_none_or(|course| course.sent);
         let mut wait = Duration::ZERO;
-        for NodeId(index) in sent.from.iter() {
+        for NodeId(index) in from.iter() {
             let node = &mut self.nodes[index];
-            let (mailbox, _) = node.candidate(sent.start)?;
-            let mailbox = node.mailboxes.remove(mailbox);
-            wait = wait.max(sent.start.since(mailbox.queued));
-            frame = Some(mailbox.frame);
+            let (place, mailbox) = node.candidate(start)?;
+            wait = wait.max(start.since(mailbox.queued));
+            if sent {
+                node.mailboxes.remove(place);
+            }
         }
-        let frame = frame?;
-        if sent.collides {
-            self.statistics.collisions += 1;
-            self.statistics.first_collision.get_or_insert(Collision {
-                start: sent.start,
-                id: frame.id(),
-                nodes: sent.from,
-            });
+        let to = if next.collides {
+            self.collide(next);
+            NodeSet::default()
+        } else {
+            self.settle(next)
+        };
+        let occurrence = self.bits(OCCURRENCE);
+        for node in &mut self.nodes {
+            node.witness(start, idle, occurrence);
+            node.go_off(idle);
+        }
+        if next.collides {
             return None;
         }
-        let busy = sent.idle.since(sent.start);
-        self.statistics.total.add(busy, wait);
-        self.statistics
-            .by_id
-            .entry(frame.id())
-            .or_default()
-            .add(busy, wait);
-        Some(Delivery {
-            time: sent.valid,
-            start: sent.start,
-            frame,
-            from: sent.from,
+        let received = !to.is_empty();
+        let is_error = course.is_some_and(|course| course.error.is_some());
+        let by_id = self.statistics.by_id.entry(next.frame.id()).or_default();
+        for carried in [&mut self.statistics.total, by_id] {
+            carried.add(idle.since(start), received.then_some(wait), is_error);
+        }
+        received.then_some(Delivery {
+            time: next.end,
+            start,
+            frame: next.frame,
+            from,
+            to,
         })
     }
 }

@@ -9,9 +9,10 @@ use base64::prelude::BASE64_STANDARD;
 use protocol::frame::CanFrame;
 use protocol::messages::Mode;
 use protocol::table;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 use protocol::wire::{BitTiming, FrameBits};
 use serde::Serialize;
+use trace::ErrorFrame;
 
 use crate::model::RobotModel;
 use crate::observer::{Observer, Truth};
@@ -170,6 +171,11 @@ impl Observer for Curves {
         if table::COMMAND.identifies(frame) {
             self.command = Some(time);
         }
+        Ok(())
+    }
+
+    fn error(&mut self, _: Instant, _: &ErrorFrame, busy: Duration) -> io::Result<()> {
+        self.busy += busy.nanos();
         Ok(())
     }
 

@@ -7,9 +7,10 @@
 //! encoder:elbow:stuck@300ms
 //! ```
 //!
-//! Two parts of a run carry them out. A wrapper around each node ([`Faulty`]) changes the frames that the node sends; a
-//! peer without frames ([`Injector`]) breaks parts of the robot and repairs them. Both are seeded, so a run with faults
-//! repeats to the byte. The controller is not informed.
+//! Three parts of a run carry them out. A wrapper around each node ([`Faulty`]) changes the frames that the node sends; a
+//! peer without frames ([`Injector`]) breaks parts of the robot and repairs them; the bus itself has the errors that CAN
+//! controllers find ([`Rig::spoil`](crate::rig::Rig::plant)). All are seeded, so a run with faults repeats to the byte. The
+//! controller is not informed.
 
 mod frames;
 mod injector;
@@ -24,6 +25,7 @@ pub use frames::Faulty;
 pub use injector::Injector;
 pub use parse::{FaultError, KINDS, Kind};
 
+use crate::bus::ErrorKind;
 use crate::plant::defect::{EncoderDefect, MotorDefect};
 
 /// A planned fault.
@@ -60,6 +62,12 @@ pub enum What {
     Frames(&'static MessageInfo, FrameFault),
     /// The node neither receives nor sends.
     Silent(Node),
+    /// Attempts to send one message, on the bus: this error, in this share of them.
+    Attempts(&'static MessageInfo, ErrorKind, f64),
+    /// The node alone reads this share of the others' frames with a wrong CRC.
+    Misreads(Node, f64),
+    /// The node's CAN controller stays bus-off.
+    NoRecovery(Node),
     /// An encoder, by axis.
     Encoder(usize, EncoderDefect),
     /// A motor, by axis.

@@ -38,6 +38,7 @@ impl Breakable for Injector {
 /// A run in progress.
 pub struct Live<'p> {
     rig: Rig<'p>,
+    seed: u64,
     desk: Rc<RefCell<Faulty<Desk>>>,
     breakable: Vec<Rc<RefCell<dyn Breakable + 'p>>>,
 }
@@ -73,12 +74,16 @@ impl<'p> Live<'p> {
 
         let mut rig = Rig::new(&setup);
         // In the order of other runs.
-        rig.attach(Rc::clone(&injector));
-        rig.attach(Rc::clone(&drives));
-        rig.attach(Rc::clone(&desk));
-        rig.attach(Rc::clone(&controller));
+        rig.attach_aside(Rc::clone(&injector));
+        rig.attach_as(Node::Drives, Rc::clone(&drives));
+        rig.attach_as(Node::Operator, Rc::clone(&desk));
+        rig.attach_as(Node::Controller, Rc::clone(&controller));
+        for fault in faults {
+            rig.spoil(fault, seed);
+        }
         Ok(Self {
             rig,
+            seed,
             breakable: vec![injector, drives, Rc::clone(&desk) as _, controller],
             desk,
         })
@@ -109,6 +114,7 @@ impl<'p> Live<'p> {
         for part in &self.breakable {
             part.borrow_mut().plant(fault);
         }
+        self.rig.spoil(fault, self.seed);
     }
 
     /// One sample.

@@ -3,7 +3,8 @@
 use std::io;
 
 use protocol::frame::CanFrame;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
+use trace::ErrorFrame;
 
 use crate::plant::Plant;
 use crate::world::{CellEvent, Mind};
@@ -61,6 +62,16 @@ pub trait Observer {
         Ok(())
     }
 
+    /// A node's CAN controller has reported an error, or a change of its error state; the bus is busy for so long with an
+    /// attempt to send that is in vain.
+    ///
+    /// # Errors
+    /// Output failed; the run ends.
+    fn error(&mut self, time: Instant, error: &ErrorFrame, busy: Duration) -> io::Result<()> {
+        let _ = (time, error, busy);
+        Ok(())
+    }
+
     /// A sample has been answered.
     ///
     /// # Errors
@@ -83,6 +94,10 @@ impl<O: Observer> Observer for &mut O {
         (**self).frame(time, frame)
     }
 
+    fn error(&mut self, time: Instant, error: &ErrorFrame, busy: Duration) -> io::Result<()> {
+        (**self).error(time, error, busy)
+    }
+
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         (**self).sample(truth)
     }
@@ -97,6 +112,11 @@ impl<O: Observer> Observer for Option<O> {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         self.as_mut()
             .map_or(Ok(()), |observer| observer.frame(time, frame))
+    }
+
+    fn error(&mut self, time: Instant, error: &ErrorFrame, busy: Duration) -> io::Result<()> {
+        self.as_mut()
+            .map_or(Ok(()), |observer| observer.error(time, error, busy))
     }
 
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
@@ -115,6 +135,11 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         self.0.frame(time, frame)?;
         self.1.frame(time, frame)
+    }
+
+    fn error(&mut self, time: Instant, error: &ErrorFrame, busy: Duration) -> io::Result<()> {
+        self.0.error(time, error, busy)?;
+        self.1.error(time, error, busy)
     }
 
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {

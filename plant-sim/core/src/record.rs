@@ -3,12 +3,22 @@
 use std::io::{self, Write};
 
 use protocol::frame::CanFrame;
-use protocol::time::Instant;
-use trace::{Interface, LogHash, Writer};
+use protocol::time::{Duration, Instant};
+use trace::{Entry, ErrorFrame, Interface, LogHash, Record, Writer};
 
 use crate::observer::{Observer, Truth};
 
-/// Every frame, as `candump -L` writes it.
+/// A record of a run's own bus.
+pub fn of_run(time: Instant, entry: Entry) -> Record {
+    Record {
+        time_us: time.micros(),
+        interface: Interface::CAN0,
+        direction: None,
+        entry,
+    }
+}
+
+/// Every frame, and what CAN controllers report of errors, as `candump -L -e` writes it.
 pub struct TraceLog<W: Write>(Writer<W>);
 
 impl<W: Write> TraceLog<W> {
@@ -29,6 +39,10 @@ impl<W: Write> TraceLog<W> {
 impl<W: Write> Observer for TraceLog<W> {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         self.0.frame(time.micros(), frame)
+    }
+
+    fn error(&mut self, time: Instant, error: &ErrorFrame, _: Duration) -> io::Result<()> {
+        self.0.error(time.micros(), error)
     }
 }
 

@@ -74,8 +74,8 @@ impl Judge {
         }
     }
 
-    /// A frame of this length was on the bus.
-    pub(crate) fn frame(&mut self, time: Instant, duration: impl FnOnce() -> Duration) {
+    /// The bus was busy for so long, with a frame or with one in vain.
+    pub(crate) fn bus(&mut self, time: Instant, duration: impl FnOnce() -> Duration) {
         if self.watches.is_empty() {
             return;
         }

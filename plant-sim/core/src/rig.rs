@@ -3,12 +3,15 @@
 //! Time advances from event to event: a peer wakes, a frame enters a transmit buffer, a frame on the bus ends. A
 //! command therefore acts as late as it would on the wire, and the same inputs give the same bytes.
 
+mod errors;
+
 use std::collections::VecDeque;
 use std::io;
 
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::ArmModel;
 use protocol::frame::CanFrame;
+use protocol::messages::Node;
 use protocol::schema::{MessageInfo, Rate};
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
@@ -71,8 +74,10 @@ pub struct Rig<'p> {
     world: World,
     bus: BuiltinBus,
     seats: Vec<Seat<'p>>,
-    /// Node that sends injected frames.
+    /// Node that sends injected frames, and of peers that are not on the bus.
     outside: NodeId,
+    /// Nodes by name.
+    names: Vec<(Node, NodeId)>,
     /// Frames that will enter the transmit buffer of their node later, by time.
     pending: VecDeque<(Instant, NodeId, CanFrame)>,
     /// Frames sent in the current call; empty between calls.
@@ -111,7 +116,8 @@ impl<'p> Rig<'p> {
                 cell_events: Vec::new(),
                 outcome: None,
             },
-            outside: bus.attach(MAILBOXES),
+            outside: bus.attach_listener(MAILBOXES),
+            names: Vec::new(),
             bus,
             seats: Vec::new(),
             pending: VecDeque::new(),
@@ -126,9 +132,26 @@ impl<'p> Rig<'p> {
     /// Adds a peer to the bus. Peers that wake at the same instant do so in the order in which they were
     /// added.
     pub fn attach(&mut self, peer: impl Peer + 'p) {
+        let node = self.bus.attach(MAILBOXES);
+        self.seat(peer, node);
+    }
+
+    /// Adds a peer to the bus under this name, for faults and error frames.
+    pub fn attach_as(&mut self, name: Node, peer: impl Peer + 'p) {
+        let node = self.bus.attach(MAILBOXES);
+        self.names.push((name, node));
+        self.seat(peer, node);
+    }
+
+    /// Adds a peer that is no node of the bus: it only wakes.
+    pub fn attach_aside(&mut self, peer: impl Peer + 'p) {
+        self.seat(peer, self.outside);
+    }
+
+    fn seat(&mut self, peer: impl Peer + 'p, node: NodeId) {
         self.seats.push(Seat {
             peer: Box::new(peer),
-            node: self.bus.attach(MAILBOXES),
+            node,
         });
     }
 
@@ -217,8 +240,12 @@ impl<'p> Rig<'p> {
         while let Some(event) = self.next_event(self.now()) {
             match event {
                 Event::Enqueue(node, time, frame) => self.enqueue(node, time, &frame),
-                Event::Delivery(None) => {}
-                Event::Delivery(Some(delivery)) => self.deliver(&delivery, observer)?,
+                Event::Delivery(delivery) => {
+                    self.tell(observer)?;
+                    if let Some(delivery) = delivery {
+                        self.deliver(&delivery, observer)?;
+                    }
+                }
                 Event::Wake(seat, time) => self.call(seat, time, None, observer)?,
             }
         }
@@ -268,7 +295,7 @@ impl<'p> Rig<'p> {
     ) -> Result<(), RunError> {
         observer.frame(delivery.time, &delivery.frame)?;
         for seat in 0..self.seats.len() {
-            if !delivery.from.contains(self.seats[seat].node) {
+            if delivery.to.contains(self.seats[seat].node) {
                 self.call(seat, delivery.time, Some(&delivery.frame), observer)?;
             }
         }

@@ -78,11 +78,17 @@ pub(crate) fn assemble<'p, C: Peer + 'p>(
     let Scenario { faults, seed, .. } = &config.scenario;
     if !faults.is_empty() {
         // Before the drives, so that what breaks at a sampling instant is sampled broken.
-        rig.attach(Injector::new(faults, *seed));
+        rig.attach_aside(Injector::new(faults, *seed));
     }
-    rig.attach(Faulty::new(drives, Node::Drives, faults, *seed));
+    let drives = Faulty::new(drives, Node::Drives, faults, *seed);
+    rig.attach_as(Node::Drives, drives);
     let operator = Operator::new(&config.scenario);
-    rig.attach(Faulty::new(operator, Node::Operator, faults, *seed));
-    rig.attach(Faulty::new(controller, Node::Controller, faults, *seed));
+    let operator = Faulty::new(operator, Node::Operator, faults, *seed);
+    rig.attach_as(Node::Operator, operator);
+    let controller = Faulty::new(controller, Node::Controller, faults, *seed);
+    rig.attach_as(Node::Controller, controller);
+    for fault in faults {
+        rig.spoil(fault, *seed);
+    }
     Ok(rig)
 }

@@ -9,10 +9,11 @@ use protocol::frame::CanFrame;
 use protocol::messages::{Cause, FaultAxis, Message, Node, State};
 use protocol::schema::Content;
 use protocol::table;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 use protocol::wire::{BitTiming, FrameBits};
 use schemars::JsonSchema;
 use serde::Serialize;
+use trace::ErrorFrame;
 
 pub use recipe::{GainsInForce, Model, Models, Recipe};
 
@@ -78,6 +79,8 @@ pub struct Summary {
     pub bus_load: f64,
     /// Frames delivered.
     pub frames: u64,
+    /// Attempts to send a frame in which a node found an error on the bus.
+    pub bus_errors: u64,
     /// Samples without a command by the time of the next sample.
     pub overruns: u64,
     /// Frames lost to a full transmit queue or an identifier collision.
@@ -224,6 +227,7 @@ impl Collector {
                 .map(|samples| samples as f64 / scenario.rate_hz),
             bus_load: bus.total.load(sim.since(Instant::ORIGIN)),
             frames: bus.total.frames,
+            bus_errors: bus.total.errors,
             overruns,
             frames_lost,
             faults,
@@ -237,7 +241,7 @@ impl Observer for Collector {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         let timing = &self.timing;
         self.judge
-            .frame(time, || timing.duration(FrameBits::exact(frame)));
+            .bus(time, || timing.duration(FrameBits::exact(frame)));
         match table::of_frame(frame).map(|info| info.content) {
             Some(Content::Emergency(Node::Controller)) => {}
             Some(Content::Command) => {
@@ -287,6 +291,11 @@ impl Observer for Collector {
             }
             _ => {}
         }
+        Ok(())
+    }
+
+    fn error(&mut self, time: Instant, _: &ErrorFrame, busy: Duration) -> io::Result<()> {
+        self.judge.bus(time, || busy);
         Ok(())
     }
 

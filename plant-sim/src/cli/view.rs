@@ -14,11 +14,12 @@ use plant_sim::record::Recording;
 use plant_sim::view::{Air, Done, Ear, ROOM, Scribe, Server, Session, Subject, offers};
 use plant_sim::{report, say};
 use protocol::frame::CanFrame;
-use protocol::time::{Instant, Period};
+use protocol::time::{self, Instant, Period};
 use protocol::wire::BitTiming;
 use sim::controller::InProcess;
 use sim::observer::Observer;
-use trace::{Entry, Interface, Record};
+use sim::record::of_run;
+use trace::{Entry, ErrorFrame, Interface};
 
 use super::arrival::record;
 use super::bitrate::bit_timing;
@@ -190,12 +191,12 @@ struct Recorder(Recording);
 
 impl Observer for Recorder {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
-        let record = Record {
-            time_us: time.micros(),
-            interface: Interface::CAN0,
-            direction: None,
-            entry: Entry::Frame(*frame),
-        };
+        let record = of_run(time, Entry::Frame(*frame));
+        self.0.record(&record).map_err(io::Error::other)
+    }
+
+    fn error(&mut self, time: Instant, error: &ErrorFrame, _: time::Duration) -> io::Result<()> {
+        let record = of_run(time, Entry::Error(*error));
         self.0.record(&record).map_err(io::Error::other)
     }
 }

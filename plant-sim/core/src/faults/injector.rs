@@ -41,7 +41,15 @@ impl Injector {
         let Fault {
             what, from, until, ..
         } = *fault;
-        if matches!(what, What::Frames(..) | What::Silent(_)) {
+        let of_robot = !matches!(
+            what,
+            What::Frames(..)
+                | What::Silent(_)
+                | What::Attempts(..)
+                | What::Misreads(..)
+                | What::NoRecovery(_)
+        );
+        if !of_robot {
             return;
         }
         let deeds = [(from, what, Deed::Break), (until, what, Deed::Repair)];
@@ -60,7 +68,12 @@ impl Injector {
             What::BrakeStuck => plant.break_brake(is_broken),
             // A payload that has fallen out does not come back.
             What::PayloadDropped if is_broken => plant.release(),
-            What::PayloadDropped | What::Frames(..) | What::Silent(_) => {}
+            What::PayloadDropped
+            | What::Frames(..)
+            | What::Silent(_)
+            | What::Attempts(..)
+            | What::Misreads(..)
+            | What::NoRecovery(_) => {}
         }
     }
 }

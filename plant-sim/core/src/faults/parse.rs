@@ -5,6 +5,7 @@ use protocol::table::TABLE;
 use protocol::time::Instant;
 
 use super::{Fault, FrameFault, What, duration};
+use crate::bus::ErrorKind;
 use crate::model::AXES;
 use crate::plant::defect::{EncoderDefect, MotorDefect};
 use crate::text::allowed;
@@ -48,6 +49,10 @@ const SHARE: Value = Value {
     default: Some(1.0),
     unit: "share of the frames",
 };
+const ATTEMPTS: Value = Value {
+    unit: "share of the attempts to send it",
+    ..SHARE
+};
 const SECONDS: Value = Value {
     least: 0.0,
     greatest: 1.0,
@@ -71,6 +76,13 @@ const fn of_message(name: &'static str, value: Option<Value>, about: &'static st
     }
 }
 
+const fn of_node(name: &'static str, value: Option<Value>, about: &'static str) -> Kind {
+    Kind {
+        place: "node",
+        ..of_message(name, value, about)
+    }
+}
+
 const fn of_axis(
     place: &'static str,
     name: &'static str,
@@ -88,7 +100,7 @@ const fn of_axis(
 
 /// Every kind, in the order of the documents.
 #[rustfmt::skip]
-pub const KINDS: [Kind; 17] = [
+pub const KINDS: [Kind; 24] = [
     of_message("loss", Some(SHARE), "the frame never gets to the bus"),
     of_message("delay", Some(SECONDS), "the frame is late"),
     of_message("jitter", Some(SECONDS), "the frame is late by a random time up to this"),
@@ -96,7 +108,14 @@ pub const KINDS: [Kind; 17] = [
     of_message("corrupt", Some(SHARE), "one bit is wrong inside the node, so that the CRC of the bus is right"),
     of_message("replay", Some(Value { least: 1.0, greatest: 64.0, default: Some(1.0), unit: "frames" }),
         "the frame is the one sent so many frames before"),
-    Kind { place: "node", has_axis: false, name: "silent", value: None, about: "the node neither receives nor sends" },
+    of_message("bit-error", Some(ATTEMPTS), "the node that sends reads another bit than its own"),
+    of_message("stuff-error", Some(ATTEMPTS), "all nodes read six equal bits in a row"),
+    of_message("form-error", Some(ATTEMPTS), "a delimiter or the end of the frame has a dominant bit"),
+    of_message("crc-error", Some(ATTEMPTS), "all that receive it find a wrong CRC"),
+    of_message("ack-error", Some(ATTEMPTS), "the node that sends reads no acknowledgement"),
+    of_node("silent", None, "the node neither receives nor sends"),
+    of_node("misread", Some(SHARE), "the node, and no other, finds a wrong CRC in what it receives"),
+    of_node("no-recovery", None, "once bus-off, the node stays so: nobody tells its CAN controller to recover"),
     of_axis("encoder", "stuck", None, "the reading does not change"),
     of_axis("encoder", "jump", Some(ANGLE), "the reading is off by this"),
     of_axis("encoder", "noise", Some(ANGLE), "the reading is off by a random angle up to this, anew in every sample"),
@@ -208,6 +227,13 @@ fn what_of(text: &str) -> Result<What, String> {
         ("duplicate", Some(info), _) => What::Frames(info, FrameFault::Duplicate),
         ("corrupt", Some(info), _) => What::Frames(info, FrameFault::Corrupt(value)),
         ("replay", Some(info), _) => What::Frames(info, FrameFault::Replay(value as usize)),
+        ("bit-error", Some(info), _) => What::Attempts(info, ErrorKind::Bit, value),
+        ("stuff-error", Some(info), _) => What::Attempts(info, ErrorKind::Stuff, value),
+        ("form-error", Some(info), _) => What::Attempts(info, ErrorKind::Form, value),
+        ("crc-error", Some(info), _) => What::Attempts(info, ErrorKind::Crc, value),
+        ("ack-error", Some(info), _) => What::Attempts(info, ErrorKind::Ack, value),
+        ("misread", _, Some(node)) => What::Misreads(node, value),
+        ("no-recovery", _, Some(node)) => What::NoRecovery(node),
         (_, _, Some(node)) => What::Silent(node),
         ("jump", ..) => What::Encoder(axis, EncoderDefect::Jump(value)),
         ("noise", ..) => What::Encoder(axis, EncoderDefect::Noise(value.abs())),

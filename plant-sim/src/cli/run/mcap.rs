@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use plant_sim::mcap::Recorder;
 use plant_sim::output::File;
 use protocol::frame::CanFrame;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 use sim::observer::{Observer, Truth};
 use sim::setup::RunConfig;
+use trace::ErrorFrame;
 
 use crate::cli::Failure;
 
@@ -39,6 +40,11 @@ impl McapFile {
 impl Observer for McapFile {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         let written = self.recorder.frame(time, frame);
+        written.map_err(|error| named(&self.path, error))
+    }
+
+    fn error(&mut self, time: Instant, error: &ErrorFrame, busy: Duration) -> io::Result<()> {
+        let written = self.recorder.error(time, error, busy);
         written.map_err(|error| named(&self.path, error))
     }
 

@@ -35,9 +35,14 @@ pub(super) fn report(results: &Results, config: &RunConfig, out: &Path) -> Strin
     difference(config, &mut text);
     motion(summary, &mut text);
     load(summary, &mut text);
+    let errors = match summary.bus_errors {
+        0 => String::new(),
+        1 => ", 1 error".into(),
+        errors => format!(", {errors} errors"),
+    };
     line!(
         text,
-        "  bus               {:.1} % load, {} frames, {} lost, {} overruns",
+        "  bus               {:.1} % load, {} frames, {} lost, {} overruns{errors}",
         summary.bus_load * 100.0,
         summary.frames,
         summary.frames_lost,
