@@ -8,7 +8,7 @@ use protocol::messages::{Message, Mode, MotionRequest, Outcome};
 use protocol::time::Instant;
 
 use super::program::{Action, Program, announce};
-use super::{Operator, Progress};
+use super::{Operator, Progress, SILENCE_LIMIT};
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::refusal::sentence;
 use crate::scenario::{PayloadSpec, Scenario};
@@ -253,8 +253,15 @@ impl Peer for Desk {
     ) -> Result<(), PeerError> {
         match received {
             Some(frame) => {
+                let before = self.operator.heard;
                 self.operator.receive(now, frame);
                 self.hear(now, frame, world);
+                // After a silence the controller wants to know again who asks, and takes a first request for a replay.
+                if self.operator.heard.since(before) > SILENCE_LIMIT {
+                    let hello = self.operator.begin(&Action::Hello);
+                    out.extend(hello.map(|frame| (now, frame)));
+                    self.orders.push_front(Order::Request(MotionRequest::Stop));
+                }
             }
             None => {
                 self.operator.next = now + self.operator.period.duration();
