@@ -16,7 +16,7 @@ use sim::setup::RunConfig;
 use sim::summary::Summary;
 
 /// What spoils a scenario, and the requirements that it then misses; none where the run does not end as it should.
-const TWINS: [(&str, &[&str], &[&str]); 15] = [
+const TWINS: [(&str, &[&str], &[&str]); 17] = [
     ("gate", &["law=pid"], &["tracking", "settling"]),
     ("gate-mismatch", &["law=pd-gravity"], &["tracking"]),
     ("gate-vertical", &["cycle[0].jump.speed=0.3"], &["cycle"]),
@@ -49,6 +49,18 @@ const TWINS: [(&str, &[&str], &[&str]); 15] = [
         "link-loss",
         &["faults=[\"drives:silent@0.5s\"]"],
         &["noticed"],
+    ),
+    // The recovery that nobody begins: nobody hears that the arm has stopped.
+    (
+        "bus-off",
+        &["faults=[\"command:bit-error@0.4s..0.406s\", \"controller:no-recovery@0s\"]"],
+        &["noticed", "reported"],
+    ),
+    // Too few errors for bus-off.
+    (
+        "bus-off-stays",
+        &["faults=[\"feedback:bit-error@0.4s..0.401s\", \"drives:no-recovery@0s\"]"],
+        &["noticed", "reported"],
     ),
     (
         "encoder-fault",

@@ -9,7 +9,7 @@ macro_rules! built_in {
 }
 
 /// Scenarios that come with the program: name and text.
-const BUILT_IN: [(&str, &str); 15] = built_in![
+const BUILT_IN: [(&str, &str); 17] = built_in![
     "gate",
     "gate-mismatch",
     "gate-vertical",
@@ -23,6 +23,8 @@ const BUILT_IN: [(&str, &str); 15] = built_in![
     "near-singular",
     "long-run",
     "link-loss",
+    "bus-off",
+    "bus-off-stays",
     "encoder-fault",
     "estop-descent"
 ];
