@@ -231,6 +231,15 @@ fn wrong_usage_or_input_is_2() {
 }
 
 #[test]
+fn a_number_of_three_hundred_digits_is_said_in_five() {
+    for option in ["--rate", "--payload", "--set=gains.bandwidth"] {
+        let output = plant_sim(&["run", &format!("{option}=1e300")]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains("1e300") && said.len() < 300, "{said}");
+    }
+}
+
+#[test]
 fn nothing_judged_is_3() {
     for tool in ["check", "replay", "decode", "stats", "plot"] {
         assert_eq!(code(&["trace", tool, "empty.log"]), 3, "{tool}");

@@ -45,7 +45,7 @@ pub(crate) fn lines(messages: &[impl ToString]) -> String {
 }
 
 /// A number in a message: very large and very small ones with an exponent.
-pub(crate) fn number(number: f64) -> String {
+pub fn number(number: f64) -> String {
     let size = number.abs();
     if size != 0.0 && size.is_finite() && !(1e-9..1e15).contains(&size) {
         format!("{number:e}")

@@ -8,6 +8,7 @@ use link::LinkAddress;
 use plant_sim::external::{histogram, measure};
 use plant_sim::output;
 use sim::scenario;
+use sim::text;
 
 use super::values::{number, svg};
 use super::{Failure, show};
@@ -33,7 +34,10 @@ pub(super) struct TimingArgs {
 /// Measures, prints percentiles and margins, draws the histogram.
 pub(super) fn run(args: &TimingArgs) -> Result<(), Failure> {
     scenario::check_rate(args.rate).map_err(|allowed| {
-        Failure::usage(format!("--rate is {}; allowed: {allowed}", args.rate))
+        Failure::usage(format!(
+            "--rate is {}; allowed: {allowed}",
+            text::number(args.rate)
+        ))
     })?;
     let time = Duration::from_secs(args.seconds.into());
     let timing = measure(&args.bus, args.rate, time).map_err(|error| error.to_string())?;

@@ -16,6 +16,9 @@ pub enum Problem {
     /// Longer than any line of a log.
     #[error("longer than {MAX_LINE} bytes, the longest line of a log")]
     TooLong,
+    /// Several lines that only carriage returns separate.
+    #[error("lines end with a carriage return alone; convert it: tr '\\r' '\\n' < FILE")]
+    CarriageReturn,
     /// The file ends within the line.
     #[error("the log was cut off within this frame")]
     Unterminated,

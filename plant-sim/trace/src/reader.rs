@@ -125,6 +125,11 @@ impl<R: BufRead> Reader<R> {
                     "compressed, and of that only .gz is read; unpack it: {program} -dc FILE | plant-sim trace ... -"
                 ),
             ));
+        } else if bytes.starts_with(b"\x1F\x8B") {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "compressed twice; unpack it once: gzip -dc FILE | plant-sim trace ... -",
+            ));
         } else if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
             return Err(io::Error::new(
                 io::ErrorKind::InvalidData,
@@ -168,11 +173,16 @@ impl<R: BufRead> Reader<R> {
             if !ended && self.buffer.len() > MAX_LINE {
                 let problem = if screen::is_can_xl(line) {
                     Problem::CanXl
+                } else if line.starts_with(b"(") && line.contains(&b'\r') {
+                    Problem::CarriageReturn
                 } else {
                     Problem::TooLong
                 };
                 self.source.skip_until(b'\n')?;
                 return Ok(Some(Err(problem)));
+            }
+            if line.starts_with(b"(") && line.contains(&b'\r') {
+                return Ok(Some(Err(Problem::CarriageReturn)));
             }
             if let Format::Candump = format
                 && Asc::begins(line)

@@ -383,6 +383,8 @@ fn what_is_not_read_is_named_with_its_converter() {
         (b"MDF     4.10", "can.logconvert FILE.mf4"),
         (b";$FILEVERSION=1.1\n", "can.logconvert FILE.trc"),
         (&b"\xFF\xFE(\x001\0.\0"[..], "iconv -f UTF-16"),
+        // What is within a compressed file: the program has unpacked that once.
+        (b"\x1F\x8B\x08\0", "compressed twice"),
         (b"\xD4\xC3\xB2\xA1\x02\0\x04\0", "editcap -F pcapng"),
     ] {
         let Some(Err(ReadError::Io { source, .. })) = Reader::new(bytes).next() else {

@@ -237,6 +237,10 @@ fn a_foreign_file_of_one_line_is_not_a_log_that_was_cut_off() {
         assert_eq!(problem(text), Problem::Timestamp, "{text}");
     }
     assert_eq!(problem("(1.0) can0 12"), Problem::Unterminated);
+    let old_mac = "(1.0) can0 123#11\r(1.1) can0 123#11\r";
+    for text in [old_mac, &old_mac.repeat(100), &format!("{old_mac}\n")] {
+        assert_eq!(problem(text), Problem::CarriageReturn, "{text}");
+    }
     assert_eq!(
         problem("base oct timestamps absolute\n"),
         Problem::Asc("a base that is neither hex nor dec")

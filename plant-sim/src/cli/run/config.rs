@@ -10,6 +10,7 @@ use sim::model::RobotModel;
 use sim::scenario::{self, Change};
 use sim::selection::LawChoice;
 use sim::setup::RunConfig;
+use sim::text;
 
 use crate::cli::Failure;
 use crate::cli::values::{number, whole};
@@ -99,7 +100,11 @@ impl ConfigArgs {
             changes.push(Change::new(format!("--cycles {cycles}"), "cycles", cycles));
         }
         if let Some(rate) = self.rate {
-            changes.push(Change::new(format!("--rate {rate}"), "rate_hz", rate));
+            changes.push(Change::new(
+                format!("--rate {}", text::number(rate)),
+                "rate_hz",
+                rate,
+            ));
         }
         if let Some(seed) = self.seed {
             changes.push(Change::new(format!("--seed {seed}"), "seed", seed));
@@ -111,7 +116,8 @@ impl ConfigArgs {
             let most = nominal.payload_max;
             if !(0.0..=most).contains(&kg) {
                 return Err(Failure::usage(format!(
-                    "--payload is {kg} kg; allowed: 0 to {most} kg for {}",
+                    "--payload is {} kg; allowed: 0 to {most} kg for {}",
+                    text::number(kg),
                     nominal.name
                 )));
             }

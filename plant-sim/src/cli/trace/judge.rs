@@ -16,6 +16,7 @@ use protocol::time::Period;
 use sim::model::RobotModel;
 use sim::rig::RigConfig;
 use sim::scenario;
+use sim::text;
 use trace::Interface;
 
 use super::args::{CheckArgs, ReplayArgs};
@@ -79,7 +80,10 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<(), Failure> {
     }
     interrupt::listen()?;
     scenario::check_rate(args.rate).map_err(|allowed| {
-        Failure::usage(format!("--rate is {}; allowed: {allowed}", args.rate))
+        Failure::usage(format!(
+            "--rate is {}; allowed: {allowed}",
+            text::number(args.rate)
+        ))
     })?;
     let model: RobotModel = load(args.model.as_deref())?;
     let config = RigConfig {
