@@ -1,4 +1,4 @@
-//! `plant-sim check`: whether a scenario could run, and what it would come to, without running it.
+//! `plant-sim check`: whether a scenario can run, and what it comes to, from its plan and a trial of one cycle.
 
 use std::fmt::Write as _;
 

@@ -52,7 +52,7 @@ struct Cli {
 enum Command {
     /// Run a scenario (the default command).
     Run(Box<run::NamedRunArgs>),
-    /// Check a scenario without running it: what would be refused, how long it takes, what torque it needs.
+    /// Check a scenario before a run: what would be refused or not followed, how long it takes, what torque it needs.
     Check(check::CheckArgs),
     /// Run many cases with a fault each, on one machine or on a cluster, and judge them.
     #[command(subcommand)]
