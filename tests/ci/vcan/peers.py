@@ -279,7 +279,8 @@ class Recorder:
         self.process = subprocess.Popen(
             [PLANT_SIM, "record", "--bus", "socketcan:vcan0", "--out", f"{WORK}/{self.name}", *self.options],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        await_true("record", lambda: sockets("vcan0") > before)
+        # Its socket comes first; whoever stops it then may look for its file.
+        await_true("record", lambda: sockets("vcan0") > before and self.files())
         return self
 
     def end(self, number):
