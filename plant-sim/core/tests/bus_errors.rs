@@ -33,6 +33,10 @@ fn feedback() -> CanFrame {
 
 impl Bench {
     fn disturb(&mut self, what: Disturbed, from: u64, until: u64) {
+        self.disturb_by(0, what, from, until);
+    }
+
+    fn disturb_by(&mut self, seed: u64, what: Disturbed, from: u64, until: u64) {
         let (from, until) = (ns(from), ns(until));
         self.bus.disturb(
             Disturbance {
@@ -41,7 +45,7 @@ impl Bench {
                 from,
                 until,
             },
-            0,
+            seed,
         );
     }
 
@@ -116,17 +120,7 @@ fn a_stuff_error_in_arbitration_is_not_counted() {
     let mut counts = std::collections::BTreeSet::new();
     for seed in 0..40 {
         let mut bench = Bench::of(2);
-        let (from, until) = (ns(0), ns(1));
-        let what = attempts(ErrorKind::Stuff);
-        bench.bus.disturb(
-            Disturbance {
-                what,
-                share: 1.0,
-                from,
-                until,
-            },
-            seed,
-        );
+        bench.disturb_by(seed, attempts(ErrorKind::Stuff), 0, 1);
         // Runs of zeros in the data as well.
         let id = Id::Standard(StandardId::new(COMMAND.id).unwrap());
         bench.send(0, 0, &CanFrame::classical(id, &[0]).unwrap());
@@ -155,17 +149,7 @@ fn an_error_in_the_data_phase_goes_on_at_the_nominal_rate() {
     let mut ends = std::collections::BTreeSet::new();
     for seed in 0..200 {
         let mut bench = Bench::of(2);
-        let (from, until) = (ns(0), ns(1));
-        let what = attempts(ErrorKind::Bit);
-        bench.bus.disturb(
-            Disturbance {
-                what,
-                share: 1.0,
-                from,
-                until,
-            },
-            seed,
-        );
+        bench.disturb_by(seed, attempts(ErrorKind::Bit), 0, 1);
         bench.send(0, 0, &command());
         let flag = bench.bus.next_event().unwrap().nanos();
         // Up to BRS 18 bits of 1 us with the stuff bit, of which the last 3 can be wrong; then 200 ns each.

@@ -170,10 +170,11 @@ impl<R: BufRead> Reader<R> {
             }
             let ended = self.buffer.ends_with(b"\n");
             let line = self.buffer.trim_ascii_end();
+            let is_joined = line.starts_with(b"(") && line.contains(&b'\r');
             if !ended && self.buffer.len() > MAX_LINE {
                 let problem = if screen::is_can_xl(line) {
                     Problem::CanXl
-                } else if line.starts_with(b"(") && line.contains(&b'\r') {
+                } else if is_joined {
                     Problem::CarriageReturn
                 } else {
                     Problem::TooLong
@@ -181,7 +182,7 @@ impl<R: BufRead> Reader<R> {
                 self.source.skip_until(b'\n')?;
                 return Ok(Some(Err(problem)));
             }
-            if line.starts_with(b"(") && line.contains(&b'\r') {
+            if is_joined {
                 return Ok(Some(Err(Problem::CarriageReturn)));
             }
             if let Format::Candump = format
