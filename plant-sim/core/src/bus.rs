@@ -13,6 +13,7 @@ mod anatomy;
 mod counters;
 mod course;
 mod disturbance;
+mod foresight;
 mod load;
 mod node;
 mod nodes;
@@ -23,11 +24,10 @@ mod statistics;
 use protocol::bus::TransmitError;
 use protocol::frame::CanFrame;
 use protocol::time::{Duration, Instant};
-use protocol::wire::{BitTiming, FrameBits, INTERMISSION, arbitration_field};
+use protocol::wire::{BitTiming, FrameBits, arbitration_field};
 
-use anatomy::Anatomy;
-use course::{Course, Flagged, Reader};
-use disturbance::{Hit, Interference};
+use disturbance::Interference;
+use foresight::{Next, Transmission};
 use node::{Mailbox, Node, OCCURRENCE};
 
 pub use anatomy::Field;
@@ -37,11 +37,6 @@ pub use load::{MAX_LOAD, Overload, Traffic, admit, worst_case_load};
 pub use nodes::{NodeId, NodeSet};
 pub use report::{Noticed, Report};
 pub use statistics::{Carried, Collision, Statistics};
-
-/// Recessive bits that end an error frame.
-const DELIMITER: u32 = 8;
-/// Error flags of a collision, superposed: 6 to 12 bits.
-const COLLISION_FLAGS: u32 = 12;
 
 /// A frame that has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,34 +53,6 @@ pub struct Delivery {
     pub to: NodeSet,
 }
 
-/// What happens next on the bus, as far as known.
-enum Next {
-    Transmission(Transmission),
-    /// This node takes part again.
-    Recovery(Instant, usize),
-}
-
-/// An attempt to send a frame.
-struct Transmission {
-    start: Instant,
-    /// When it is known what becomes of it: the frame is valid, or an error flag begins.
-    end: Instant,
-    idle: Instant,
-    frame: CanFrame,
-    from: NodeSet,
-    collides: bool,
-    /// Where anything is wrong with it.
-    trouble: Option<Trouble>,
-}
-
-/// What is wrong with an attempt.
-struct Trouble {
-    hit: Option<Hit>,
-    /// Nodes that take part, in the order of the course's readers.
-    readers: Vec<(usize, Reader)>,
-    course: Course,
-}
-
 /// The bus and the transmit side of its nodes' controllers.
 ///
 /// A controller sends its mailboxes in the order of their priority (as bxCAN by default, M_CAN in queue mode), frames
@@ -93,10 +60,16 @@ struct Trouble {
 /// once its frame is valid for the receivers; until then the frame is sent again and again.
 pub struct BuiltinBus {
     timing: BitTiming,
+    /// Duration of [`OCCURRENCE`].
+    occurrence: Duration,
+    /// [`BitTiming::after_valid`].
+    after_valid: Duration,
     nodes: Vec<Node>,
     /// End of the last intermission; no frame starts earlier.
     idle: Instant,
     interference: Interference,
+    /// What happens next, renewed by whatever can change it.
+    next: Option<Next>,
     reports: Vec<Report>,
     statistics: Statistics,
 }
@@ -109,10 +82,16 @@ impl BuiltinBus {
     #[must_use]
     pub fn new(timing: BitTiming) -> Self {
         Self {
+            occurrence: timing.duration(FrameBits {
+                nominal: OCCURRENCE,
+                data: 0,
+            }),
+            after_valid: timing.after_valid(),
             timing,
             nodes: Vec::new(),
             idle: Instant::ORIGIN,
             interference: Interference::default(),
+            next: None,
             reports: Vec::new(),
             statistics: Statistics::default(),
         }
@@ -142,12 +121,14 @@ impl BuiltinBus {
             Self::MAX_NODES
         );
         self.nodes.push(node);
+        self.next = self.foreseen();
         NodeId(self.nodes.len() - 1)
     }
 
     /// Adds a disturbance, with random numbers from `seed`.
     pub fn disturb(&mut self, disturbance: Disturbance, seed: u64) {
         self.interference.add(disturbance, seed);
+        self.next = self.foreseen();
     }
 
     /// From `from` until `until` nobody tells the controller of this node to recover once it is bus-off.
@@ -195,6 +176,7 @@ impl BuiltinBus {
             queued: now,
             duration: self.timing.duration(FrameBits::exact(frame)),
         });
+        self.next = self.foreseen();
         Ok(())
     }
 
@@ -202,10 +184,7 @@ impl BuiltinBus {
     /// bus-off; `None` when nothing will happen.
     #[must_use]
     pub fn next_event(&self) -> Option<Instant> {
-        Some(match self.next()? {
-            Next::Transmission(next) => next.end,
-            Next::Recovery(time, _) => time,
-        })
+        self.next.as_ref().map(Next::time)
     }
 
     /// The oldest frame received at or before `until` and not yet taken.
@@ -214,17 +193,18 @@ impl BuiltinBus {
     /// for as long as that.
     pub fn pop_delivery(&mut self, until: Instant) -> Option<Delivery> {
         loop {
-            match self.next()? {
-                Next::Transmission(next) if next.end <= until => {
-                    if let Some(delivery) = self.complete(&next) {
-                        return Some(delivery);
-                    }
-                }
-                Next::Recovery(time, node) if time <= until => {
+            let next = self.next.take_if(|next| next.time() <= until)?;
+            let delivery = match next {
+                Next::Transmission(next) => self.complete(&next),
+                Next::Recovery(time, node) => {
                     self.nodes[node].recover(time);
                     self.report(time, node, Noticed::Recovered, Duration::ZERO);
+                    None
                 }
-                _ => return None,
+            };
+            self.next = self.foreseen();
+            if delivery.is_some() {
+                return delivery;
             }
         }
     }
@@ -240,114 +220,9 @@ impl BuiltinBus {
         &self.statistics
     }
 
-    fn next(&self) -> Option<Next> {
-        let occurrence = self.bits(OCCURRENCE);
-        let recovery = (self.nodes.iter().enumerate())
-            .filter_map(|(index, node)| Some((node.recovers(occurrence)?, index)))
-            .min();
-        let transmission = self.next_transmission();
-        match (recovery, transmission) {
-            (Some((time, node)), next) if next.as_ref().is_none_or(|next| time <= next.start) => {
-                Some(Next::Recovery(time, node))
-            }
-            (_, next) => next.map(Next::Transmission),
-        }
-    }
-
     /// Duration of nominal bits.
     fn bits(&self, nominal: u32) -> Duration {
         self.timing.duration(FrameBits { nominal, data: 0 })
-    }
-
-    /// Arbitration among the frames queued so far.
-    ///
-    /// A frame in transmission needs no state: frames queued after its start are not candidates, so the answer stays
-    /// the same until it is complete.
-    fn next_transmission(&self) -> Option<Transmission> {
-        let earliest = |node: &Node| node.earliest(self.idle);
-        let start = self.nodes.iter().filter_map(earliest).min()?;
-        let candidates = || {
-            self.nodes
-                .iter()
-                .enumerate()
-                .filter_map(|(index, node)| Some((index, node.candidate(start)?.1)))
-        };
-        let (_, winner) = candidates().min_by_key(|(_, mailbox)| mailbox.arbitration)?;
-
-        let mut from = NodeSet::default();
-        let mut collides = false;
-        let mut duration = Duration::ZERO;
-        for (index, mailbox) in
-            candidates().filter(|(_, mailbox)| mailbox.arbitration == winner.arbitration)
-        {
-            from.insert(index);
-            collides |= mailbox.frame != winner.frame;
-            duration = duration.max(mailbox.duration);
-        }
-        if collides {
-            // An upper bound: the longest frame in full, as if the last bit were the first to differ.
-            duration += self.bits(COLLISION_FLAGS + DELIMITER);
-        }
-        let mut next = Transmission {
-            start,
-            end: start + duration.saturating_sub(self.timing.after_valid()),
-            idle: start + duration,
-            frame: winner.frame,
-            from,
-            collides,
-            trouble: None,
-        };
-        if !collides {
-            next.trouble = self.trouble(start, &winner.frame, from);
-        }
-        if let Some((flagged, flags)) = next.trouble.as_ref().and_then(|it| it.course.destroyed) {
-            let anatomy = Anatomy::of(&winner.frame);
-            let bits = anatomy.until(match flagged {
-                Flagged::Bit(index) => index,
-                Flagged::Field(field) => anatomy.first(field),
-            });
-            next.end = start + self.timing.duration(bits);
-            next.idle = next.end + self.bits(flags + DELIMITER + INTERMISSION);
-        }
-        Some(next)
-    }
-
-    /// What is wrong with an attempt to send `frame`, if anything is.
-    fn trouble(&self, start: Instant, frame: &CanFrame, from: NodeSet) -> Option<Trouble> {
-        let others = || {
-            let part = |(index, node): &(usize, &Node)| {
-                node.takes_part() && !from.contains(NodeId(*index))
-            };
-            self.nodes.iter().enumerate().filter(part)
-        };
-        let calm = !self.interference.acts(start);
-        if calm && others().next().is_some() {
-            return None;
-        }
-        let hit = self.interference.hit(start, frame);
-        let for_all = hit.is_some_and(|hit| hit.kind == ErrorKind::Crc);
-        let reader = |(index, node): (usize, &Node)| {
-            let reader = Reader {
-                state: node.counters.state(),
-                misreads: for_all || self.interference.misleads(start, NodeId(index)),
-            };
-            (index, reader)
-        };
-        let readers: Vec<_> = others().map(reader).collect();
-        let senders = from.iter().map(|node| self.counters(node).state());
-        let course = course::course(
-            senders.min().unwrap_or(State::ErrorActive),
-            &readers
-                .iter()
-                .map(|(_, reader)| *reader)
-                .collect::<Vec<_>>(),
-            hit.filter(|_| !for_all),
-        );
-        Some(Trouble {
-            hit,
-            readers,
-            course,
-        })
     }
 
     /// Empties the senders' mailboxes if the frame was sent, counts and reports; returns the frame if it was received.
@@ -373,9 +248,8 @@ impl BuiltinBus {
         } else {
             self.settle(next)
         };
-        let occurrence = self.bits(OCCURRENCE);
         for node in &mut self.nodes {
-            node.witness(start, idle, occurrence);
+            node.witness(start, idle, self.occurrence);
             node.go_off(idle);
         }
         if next.collides {

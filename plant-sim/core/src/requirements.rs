@@ -76,14 +76,13 @@ impl Judge {
 
     /// The bus was busy for so long, with a frame or with one in vain.
     pub(crate) fn bus(&mut self, time: Instant, duration: impl FnOnce() -> Duration) {
-        if self.watches.is_empty() {
-            return;
-        }
-        let (t, busy) = (time.seconds(), duration().seconds());
-        for watch in watches(&mut self.watches, t, self.cycle) {
-            if watch.quantity() == Quantity::BusLoad {
-                watch.add(0, busy);
-            }
+        let t = time.seconds();
+        let mut loads = watches(&mut self.watches, t, self.cycle)
+            .filter(|watch| watch.quantity() == Quantity::BusLoad)
+            .peekable();
+        if loads.peek().is_some() {
+            let busy = duration().seconds();
+            loads.for_each(|watch| watch.add(0, busy));
         }
     }
 

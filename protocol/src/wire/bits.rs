@@ -179,11 +179,13 @@ impl Stuffing {
 
     /// Sends whole bytes, highest bit first.
     fn push_bytes(&mut self, bytes: &[u8]) {
+        let mut row = self.run.row();
         for &byte in bytes {
-            let (run, inserted) = BYTES[self.run.index()][usize::from(byte)];
-            self.run = run;
-            self.inserted += u32::from(inserted);
+            let entry = BYTES[usize::from(row | u16::from(byte)) % BYTES.len()];
+            row = entry & ROW;
+            self.inserted += u32::from(entry & !ROW);
         }
+        self.run = Run::of_row(row);
     }
 
     /// Stuff bits, including one required after the last bit sent.
@@ -213,34 +215,41 @@ impl Run {
         stuff
     }
 
-    const fn index(self) -> usize {
-        2 * self.length as usize + self.bit as usize
+    /// Its row of [`BYTES`]: the place of the first entry.
+    const fn row(self) -> u16 {
+        (2 * self.length as u16 + self.bit as u16) << 8
+    }
+
+    const fn of_row(row: u16) -> Self {
+        let index = (row >> 8) as u8;
+        Self {
+            bit: index % 2,
+            length: index / 2,
+        }
     }
 }
 
-/// The run after a byte, and the stuff bits that it took, by [`Run::index`] and byte.
+/// The part of an entry of [`BYTES`] that is the next row.
+const ROW: u16 = 0xFF00;
+
+/// By [`Run::row`] and byte: the row after this byte, and the stuff bits that it took. Nothing uses the last rows; they make the
+/// length a power of two.
 ///
-/// Bit by bit, a 64-byte payload would cost more than everything else that the bus does for a frame.
-static BYTES: [[(Run, u8); 256]; 12] = {
-    let mut table = [[(Run { bit: 0, length: 0 }, 0); 256]; 12];
-    let mut index = 0;
-    while index < 12 {
-        let mut byte = 0;
-        while byte < 256 {
-            let mut run = Run {
-                bit: index as u8 % 2,
-                length: index as u8 / 2,
-            };
-            let mut inserted = 0;
-            let mut shift = 8;
-            while shift > 0 {
-                shift -= 1;
-                inserted += run.push((byte >> shift & 1) as u8) as u8;
-            }
-            table[index][byte] = (run, inserted);
-            byte += 1;
+/// Bit by bit, a 64-byte payload would cost more than everything else that the bus does for a frame. Each byte has to wait for
+/// the row that the one before it leads to, so that an entry is one number, and found without arithmetic.
+static BYTES: [u16; 16 << 8] = {
+    let mut table = [0; 16 << 8];
+    let mut place = 0;
+    while place < 12 << 8 {
+        let mut run = Run::of_row(place & ROW);
+        let mut inserted = 0;
+        let mut shift = 8;
+        while shift > 0 {
+            shift -= 1;
+            inserted += run.push((place >> shift & 1) as u8) as u16;
         }
-        index += 1;
+        table[place as usize] = run.row() | inserted;
+        place += 1;
     }
     table
 };

@@ -17,9 +17,12 @@ impl NodeSet {
 
     /// The nodes, in the order they were attached.
     pub fn iter(self) -> impl Iterator<Item = NodeId> {
-        (0..u64::BITS as usize)
-            .map(NodeId)
-            .filter(move |&node| self.contains(node))
+        let mut left = self.0;
+        std::iter::from_fn(move || {
+            let node = left.trailing_zeros();
+            left &= left.checked_sub(1)?;
+            Some(NodeId(node as usize))
+        })
     }
 
     /// Whether there is none.

@@ -4,9 +4,10 @@ use protocol::time::{Duration, Instant};
 
 use super::counters::{Rule, State};
 use super::disturbance::ErrorKind;
+use super::foresight::{Transmission, Trouble};
 use super::report::{Noticed, Report};
 use super::statistics::Collision;
-use super::{BuiltinBus, Field, NodeId, NodeSet, Transmission, Trouble};
+use super::{BuiltinBus, Field, NodeId, NodeSet};
 
 /// Bits for which a passive transmitter lets others go first.
 const SUSPENSION: u32 = 8;
@@ -53,7 +54,7 @@ impl BuiltinBus {
         }
         if let Some(Trouble {
             readers, course, ..
-        }) = &next.trouble
+        }) = next.trouble.as_deref()
         {
             for ((index, _), (rules, received)) in readers.iter().zip(&course.readers) {
                 for rule in rules {
@@ -102,11 +103,9 @@ impl BuiltinBus {
             Some(course) if course.passive_flag => PASSIVE_FLAG,
             _ => 0,
         };
-        let ready = next.idle + self.bits(SUSPENSION + flag);
         for NodeId(index) in next.from.iter() {
-            let node = &mut self.nodes[index];
-            if node.counters.state() == State::ErrorPassive {
-                node.ready = ready;
+            if self.nodes[index].counters.state() == State::ErrorPassive {
+                self.nodes[index].ready = next.idle + self.bits(SUSPENSION + flag);
             }
         }
     }
