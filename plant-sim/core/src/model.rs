@@ -8,6 +8,8 @@ pub mod file;
 mod json;
 mod read;
 
+use std::sync::LazyLock;
+
 use protocol::messages::FaultAxis;
 use thiserror::Error;
 
@@ -227,10 +229,17 @@ impl RobotModel {
 
     /// The model of this name that comes with the program.
     pub fn built_in(name: &str) -> Option<Self> {
-        let (name, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
-        let (mut model, _) = Self::from_json(text).expect("the built-in models are valid");
-        model.source.origin = (*name).into();
-        Some(model)
+        // Read once: a campaign asks for one twice a case.
+        static ROBOTS: LazyLock<[RobotModel; BUILT_IN.len()]> = LazyLock::new(|| {
+            BUILT_IN.map(|(name, text)| {
+                let read = RobotModel::from_json(text);
+                let (mut model, _) = read.expect("the built-in models are valid");
+                model.source.origin = name.into();
+                model
+            })
+        });
+        let place = BUILT_IN.iter().position(|(known, _)| *known == name)?;
+        Some(ROBOTS[place].clone())
     }
 
     /// Whether this is the text of a model that comes with the program.

@@ -14,7 +14,7 @@
 use nalgebra::Vector4;
 
 use crate::model::{Payload, RobotModel};
-use crate::plant::arm::Arm;
+use crate::plant::arm::{Arm, Configuration};
 use crate::plant::brake::Brake;
 use crate::plant::drive::Drive;
 use crate::plant::stop::EndStops;
@@ -100,9 +100,13 @@ impl Bounds {
 
     /// Kinetic energy of arm, rotors and payload, J.
     pub fn energy(&self, q: &[f64; 4], qd: &[f64; 4]) -> f64 {
-        let (q, qd) = (Vector4::from(*q), Vector4::from(*qd));
+        self.energy_at(&self.arm.at(&Vector4::from(*q)), qd)
+    }
+
+    fn energy_at(&self, at: &Configuration, qd: &[f64; 4]) -> f64 {
+        let qd = Vector4::from(*qd);
         let rotors = 0.5 * qd.dot(&(self.drive.rotor_inertia() * qd));
-        self.arm.kinetic_energy(&self.arm.at(&q), &qd) + rotors
+        self.arm.kinetic_energy(at, &qd) + rotors
     }
 
     /// Energy in the springs of the end stops, J.
@@ -112,6 +116,7 @@ impl Bounds {
 
     /// The most kinetic energy at this pose that the speed limits allow, J.
     pub fn energy_limit(&self, q: &[f64; 4]) -> f64 {
+        let at = self.arm.at(&Vector4::from(*q));
         let speed = self.model.limits.velocity.map(|limit| SPEED_FACTOR * limit);
         let signed = |signs: u32| {
             let qd = std::array::from_fn(|i| {
@@ -121,7 +126,7 @@ impl Bounds {
                     -speed[i]
                 }
             });
-            self.energy(q, &qd)
+            self.energy_at(&at, &qd)
         };
         // The opposite of all four has the same energy.
         (0..8).map(signed).fold(0.0, f64::max)

@@ -18,6 +18,8 @@ pub struct Faulty<P> {
     node: Node,
     faults: Vec<Suffered>,
     random: Rand64,
+    /// What the node has sent in the current call; empty between calls.
+    sent: Outbox,
 }
 
 /// A fault of one message's frames, or the silence of the node.
@@ -37,6 +39,7 @@ impl<P: Peer> Faulty<P> {
             faults: Vec::new(),
             // Each node draws from its own sequence, so that the frames of one do not change the faults of another.
             random: Rand64::new(u128::from(seed) << 8 | node as u128),
+            sent: Outbox::new(),
         };
         for fault in faults {
             faulty.suffer_also(fault);
@@ -77,7 +80,8 @@ impl<P: Peer> Faulty<P> {
 
     /// What becomes of a frame that the node sends at `time`.
     fn suffer(&mut self, time: Instant, frame: CanFrame, out: &mut Outbox) {
-        let mut sent = vec![(time, frame)];
+        let first = out.len();
+        out.push((time, frame));
         for Suffered { fault, history } in &mut self.faults {
             let What::Frames(info, kind) = fault.what else {
                 continue;
@@ -99,31 +103,33 @@ impl<P: Peer> Faulty<P> {
             match kind {
                 FrameFault::Loss(share) => {
                     if self.random.rand_float() < share {
-                        sent.clear();
+                        out.truncate(first);
                     }
                 }
-                FrameFault::Delay(seconds) => delay(&mut sent, seconds),
-                FrameFault::Jitter(seconds) => delay(&mut sent, seconds * self.random.rand_float()),
-                FrameFault::Duplicate => sent.extend_from_within(..),
+                FrameFault::Delay(seconds) => delay(&mut out[first..], seconds),
+                FrameFault::Jitter(seconds) => {
+                    delay(&mut out[first..], seconds * self.random.rand_float())
+                }
+                FrameFault::Duplicate => out.extend_from_within(first..),
                 FrameFault::Corrupt(share) => {
                     if self.random.rand_float() < share {
-                        for (_, frame) in &mut sent {
+                        for (_, frame) in &mut out[first..] {
                             flip(frame, &mut self.random);
                         }
                     }
                 }
                 FrameFault::Replay(_) => {
                     if let Some(old) = old {
-                        sent = vec![(time, old)];
+                        out.truncate(first);
+                        out.push((time, old));
                     }
                 }
             }
         }
-        out.extend(sent);
     }
 }
 
-fn delay(sent: &mut Outbox, seconds: f64) {
+fn delay(sent: &mut [(Instant, CanFrame)], seconds: f64) {
     for (time, _) in sent {
         *time += duration(seconds);
     }
@@ -165,13 +171,14 @@ impl<P: Peer> Peer for Faulty<P> {
         if silent && received.is_some() {
             return Ok(());
         }
-        let before = out.len();
-        self.peer.poll(now, received, world, out)?;
-        for (time, frame) in out.split_off(before) {
+        let mut sent = std::mem::take(&mut self.sent);
+        self.peer.poll(now, received, world, &mut sent)?;
+        for (time, frame) in sent.drain(..) {
             if !silent {
                 self.suffer(time, frame, out);
             }
         }
+        self.sent = sent;
         Ok(())
     }
 }
