@@ -1,16 +1,18 @@
 //! Decoded traces: a line of text per frame, a CSV row per field, or a JSON object per frame.
 
 mod line;
+mod template;
 
 use std::io::{self, Write};
 
 use protocol::codec::DecodeError;
 use protocol::frame::CanFrame;
 use protocol::table;
-use serde_json::Value as Json;
 
-use super::fields::{Decoded, Field, Value, full_name};
+use super::fields::Decoded;
+use super::text::Line;
 use super::{Entry, ErrorFrame, Record};
+use template::Template;
 
 pub use line::{JsonField, JsonLine, JsonValue};
 
@@ -30,6 +32,11 @@ pub enum Format {
 pub struct Decoder<W: Write> {
     sink: W,
     format: Format,
+    /// Those of the frames so far.
+    templates: Vec<Template>,
+    line: Line,
+    /// How each row of a record begins, in CSV.
+    row: Line,
 }
 
 impl<W: Write> Decoder<W> {
@@ -41,7 +48,13 @@ impl<W: Write> Decoder<W> {
         if format == Format::Csv {
             sink.write_all(b"time_s,interface,id,message,counter,field,value,unit\n")?;
         }
-        Ok(Self { sink, format })
+        Ok(Self {
+            sink,
+            format,
+            templates: Vec::new(),
+            line: Line::default(),
+            row: Line::default(),
+        })
     }
 
     /// Appends one record.
@@ -50,11 +63,13 @@ impl<W: Write> Decoder<W> {
     /// Those of the sink.
     pub fn record(&mut self, record: &Record) -> io::Result<()> {
         let content = Content::new(record);
+        self.line.clear();
         match self.format {
             Format::Text => self.text(record, &content),
             Format::Csv => self.csv(record, &content),
             Format::JsonLines => self.json(record, &content),
         }
+        self.sink.write_all(self.line.bytes())
     }
 
     /// Flushes the sink, so that a reader at the other end of a pipe sees everything.
@@ -74,99 +89,121 @@ impl<W: Write> Decoder<W> {
         Ok(self.sink)
     }
 
-    fn text(&mut self, record: &Record, content: &Content) -> io::Result<()> {
-        let sink = &mut self.sink;
-        write!(
-            sink,
-            "{} {} {} {}",
-            Seconds(record.time_us),
-            record.interface,
-            content.id(),
-            content.name()
-        )?;
-        write!(sink, " ")?;
-        content.words(sink)?;
-        writeln!(sink)
+    /// The fields of a frame.
+    fn fields(&mut self, decoded: &Decoded) {
+        let known = self.templates.iter().position(|it| it.fits(decoded));
+        let place = known.unwrap_or_else(|| {
+            self.templates.push(Template::new(self.format, decoded));
+            self.templates.len() - 1
+        });
+        self.templates[place].fill(decoded, &self.row, &mut self.line);
     }
 
-    fn csv(&mut self, record: &Record, content: &Content) -> io::Result<()> {
-        let counter = match content {
-            Content::Message(_, decoded) => decoded.counter,
-            _ => None,
-        };
-        let start = format!(
-            "{},{},{},{},{}",
-            Seconds(record.time_us),
-            csv_text(&record.interface.to_string()),
-            content.id(),
-            content.name(),
-            counter.map_or(String::new(), |counter| counter.to_string())
-        );
-        let Content::Message(_, decoded) = content else {
-            writeln!(self.sink, "{start},error,{},", csv_text(&content.error()))?;
-            return writeln!(self.sink, "{start},raw,{},", content.raw());
-        };
-        for field in decoded.fields() {
-            for (element, unit, value) in field.elements() {
-                write!(
-                    self.sink,
-                    "{start},{},",
-                    full_name(field.signal.name, element)
-                )?;
-                writeln!(self.sink, "{value},{unit}")?;
+    fn text(&mut self, record: &Record, content: &Content) {
+        let line = &mut self.line;
+        line.seconds(record.time_us);
+        line.byte(b' ');
+        line.extend(record.interface.as_bytes());
+        line.byte(b' ');
+        content.id(line);
+        line.byte(b' ');
+        line.word(content.name());
+        line.byte(b' ');
+        content.words(line);
+        if let Content::Message(_, decoded) = content {
+            self.fields(decoded);
+        }
+        self.line.byte(b'\n');
+    }
+
+    fn csv(&mut self, record: &Record, content: &Content) {
+        let (line, row) = (&mut self.line, &mut self.row);
+        row.clear();
+        row.seconds(record.time_us);
+        row.byte(b',');
+        let interface = record.interface.as_bytes();
+        if interface.iter().any(|byte| b",\"".contains(byte)) {
+            row.word(&csv_text(&record.interface.to_string()));
+        } else {
+            row.extend(interface);
+        }
+        row.byte(b',');
+        content.id(row);
+        row.byte(b',');
+        row.word(content.name());
+        row.byte(b',');
+        match content {
+            Content::Message(_, decoded) => {
+                if let Some(counter) = decoded.counter {
+                    row.integer(counter);
+                }
+                self.fields(decoded);
+            }
+            _ => {
+                line.extend(row.bytes());
+                line.word(",error,");
+                line.word(&csv_text(&content.error()));
+                line.word(",\n");
+                line.extend(row.bytes());
+                line.word(",raw,");
+                line.word(&content.raw());
+                line.word(",\n");
             }
         }
-        Ok(())
     }
 
-    /// Written by hand: names, units and messages come from tables and contain nothing that JSON has to escape.
-    fn json(&mut self, record: &Record, content: &Content) -> io::Result<()> {
-        let sink = &mut self.sink;
-        write!(
-            sink,
-            r#"{{"time_s":{},"interface":{},"id":"{}","message":"{}""#,
-            Seconds(record.time_us),
-            // An interface may have any name.
-            Json::from(record.interface.to_string()),
-            content.id(),
-            content.name()
-        )?;
+    fn json(&mut self, record: &Record, content: &Content) {
+        let line = &mut self.line;
+        line.word(r#"{"time_s":"#);
+        line.seconds(record.time_us);
+        line.word(r#","interface":""#);
+        for &byte in record.interface.as_bytes() {
+            // Printable ASCII, of which JSON escapes these.
+            if b"\"\\".contains(&byte) {
+                line.byte(b'\\');
+            }
+            line.byte(byte);
+        }
+        line.word(r#"","id":""#);
+        content.id(line);
+        line.word(r#"","message":""#);
+        line.word(content.name());
+        line.byte(b'"');
         if let Some(direction) = record.direction {
-            write!(sink, r#","direction":"{}""#, direction.name())?;
+            line.word(r#","direction":""#);
+            line.word(direction.name());
+            line.byte(b'"');
         }
         match content {
             Content::Message(_, decoded) => {
                 if let Some(counter) = decoded.counter {
-                    write!(sink, r#","counter":{counter}"#)?;
+                    line.word(r#","counter":"#);
+                    line.integer(counter);
                 }
-                sink.write_all(br#","fields":{"#)?;
-                let mut separator = "";
-                for field in decoded.fields() {
-                    for element in field.elements() {
-                        sink.write_all(separator.as_bytes())?;
-                        separator = ",";
-                        json_element(sink, field.signal.name, element)?;
-                    }
-                }
-                sink.write_all(b"}}\n")
+                self.fields(decoded);
             }
-            _ => writeln!(
-                sink,
-                r#","error":"{}","raw":"{}"}}"#,
-                content.error(),
-                content.raw()
-            ),
+            _ => {
+                line.word(r#","error":""#);
+                line.word(&content.error());
+                line.word(r#"","raw":""#);
+                line.word(&content.raw());
+                line.byte(b'"');
+            }
         }
+        self.line.word("}\n");
     }
 }
 
 /// Counter and fields of a record as text, without time, interface and identifier.
 #[must_use]
 pub fn describe(record: &Record) -> String {
-    let mut text = Vec::new();
-    // Writing to a vector cannot fail, and everything written is text.
-    let _ = Content::new(record).words(&mut text);
-    String::from_utf8_lossy(&text).into_owned()
+    let content = Content::new(record);
+    let mut line = Line::default();
+    content.words(&mut line);
+    if let Content::Message(_, decoded) = &content {
+        Template::new(Format::Text, decoded).fill(decoded, &Line::default(), &mut line);
+    }
+    String::from_utf8_lossy(line.bytes()).into_owned()
 }
 
 /// Decoded content of a record.
@@ -187,28 +224,29 @@ impl<'a> Content<'a> {
         }
     }
 
-    /// Counter and fields, or the error and the bytes.
-    fn words(&self, sink: &mut impl Write) -> io::Result<()> {
-        let Self::Message(_, decoded) = self else {
-            return write!(sink, "{}: {}", self.error(), self.raw());
-        };
-        let mut separator = "";
-        if let Some(counter) = decoded.counter {
-            write!(sink, "#{counter}")?;
-            separator = "  ";
+    /// What comes before the fields: the counter. If there are none, the error and the bytes.
+    fn words(&self, line: &mut Line) {
+        match self {
+            Self::Message(_, decoded) => {
+                if let Some(counter) = decoded.counter {
+                    line.byte(b'#');
+                    line.integer(counter);
+                }
+            }
+            _ => {
+                line.word(&self.error());
+                line.word(": ");
+                line.word(&self.raw());
+            }
         }
-        for field in decoded.fields() {
-            sink.write_all(separator.as_bytes())?;
-            separator = "  ";
-            text_field(sink, field)?;
-        }
-        Ok(())
     }
 
-    fn id(&self) -> String {
+    fn id(&self, line: &mut Line) {
         match self {
-            Self::Message(frame, _) | Self::Refused(frame, _) => id(frame),
-            Self::ErrorFrame(error) => format!("{:08X}", super::ERROR_FLAG | error.class),
+            Self::Message(frame, _) | Self::Refused(frame, _) => {
+                line.hex(frame.raw_id(), if frame.is_extended() { 8 } else { 3 });
+            }
+            Self::ErrorFrame(error) => line.hex(super::ERROR_FLAG | error.class, 8),
         }
     }
 
@@ -249,43 +287,6 @@ pub(super) fn id(frame: &CanFrame) -> String {
     }
 }
 
-/// A time with all its microseconds, exact.
-pub(super) struct Seconds(pub u64);
-
-impl std::fmt::Display for Seconds {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}.{:06}", self.0 / 1_000_000, self.0 % 1_000_000)
-    }
-}
-
-/// `name=value unit`, or `name=(value, value) unit` if all elements share the unit.
-fn text_field(sink: &mut impl Write, field: Field) -> io::Result<()> {
-    write!(sink, "{}=", field.signal.name)?;
-    let elements = field.signal.elements;
-    let common = elements
-        .first()
-        .filter(|(_, first)| elements.iter().all(|(_, unit)| unit == first));
-    if elements.len() > 1 {
-        sink.write_all(b"(")?;
-    }
-    for (index, (_, unit, value)) in field.elements().enumerate() {
-        if index > 0 {
-            sink.write_all(b", ")?;
-        }
-        write!(sink, "{value}")?;
-        if common.is_none() {
-            write!(sink, " {unit}")?;
-        }
-    }
-    if elements.len() > 1 {
-        sink.write_all(b")")?;
-    }
-    match common {
-        Some((_, unit)) if !unit.is_empty() => write!(sink, " {unit}"),
-        _ => Ok(()),
-    }
-}
-
 /// Quoted if it has to be (RFC 4180).
 fn csv_text(text: &str) -> String {
     if text.contains([',', '"']) {
@@ -293,26 +294,4 @@ fn csv_text(text: &str) -> String {
     } else {
         text.to_owned()
     }
-}
-
-/// `"name":{"value":1.5,"unit":"rad"}`; flags are a list of the names set.
-fn json_element(
-    sink: &mut impl Write,
-    signal: &str,
-    (element, unit, value): (&str, &str, Value),
-) -> io::Result<()> {
-    write!(sink, r#""{}":{{"value":"#, full_name(signal, element))?;
-    match value {
-        Value::Code(name) => write!(sink, r#""{name}""#)?,
-        Value::Flags(..) => {
-            let names: Vec<String> = value.flags().map(|name| format!("\"{name}\"")).collect();
-            write!(sink, "[{}]", names.join(","))?;
-        }
-        // Enough digits to distinguish this float from every other.
-        Value::Unsigned(_) | Value::Signed(_) | Value::Float(_) => write!(sink, "{value}")?,
-    }
-    if !unit.is_empty() {
-        write!(sink, r#","unit":"{unit}""#)?;
-    }
-    sink.write_all(b"}")
 }

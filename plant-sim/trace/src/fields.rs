@@ -38,10 +38,15 @@ impl Decoded {
         })
     }
 
+    /// The bytes before the protection.
+    pub(crate) fn body(&self) -> &[u8] {
+        &self.body[..self.len]
+    }
+
     /// The fields that are present, in the order of the table.
     pub fn fields(&self) -> impl Iterator<Item = Field<'_>> {
         let mut selected = None;
-        let body = &self.body[..self.len];
+        let body = self.body();
         self.info.signals.iter().filter_map(move |signal| {
             if signal.when.is_some() && signal.when != selected {
                 return None;
@@ -91,12 +96,14 @@ pub enum Value {
 }
 
 impl Value {
-    /// Value of the little-endian `bytes`, as many as the kind takes.
-    fn new(kind: Kind, bytes: &[u8]) -> Self {
-        let raw = bytes
-            .iter()
-            .rev()
-            .fold(0, |value, &byte| value << 8 | u32::from(byte));
+    /// Value of the first of the little-endian `bytes`, as many as the kind takes.
+    pub(crate) fn new(kind: Kind, bytes: &[u8]) -> Self {
+        let raw = match (kind.size(), bytes) {
+            (1, &[a, ..]) => u32::from(a),
+            (2, &[a, b, ..]) => u32::from(u16::from_le_bytes([a, b])),
+            (_, &[a, b, c, d, ..]) => u32::from_le_bytes([a, b, c, d]),
+            _ => 0,
+        };
         match kind {
             Kind::U8 | Kind::U16 | Kind::U32 => Self::Unsigned(raw),
             Kind::I16 => Self::Signed(i32::from(raw as i16)),

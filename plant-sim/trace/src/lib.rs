@@ -43,6 +43,7 @@ mod line;
 mod reader;
 pub mod select;
 pub mod stats;
+mod text;
 mod writer;
 
 use std::fmt;

@@ -126,11 +126,15 @@ pub(super) fn parse(line: &[u8]) -> Result<Record, Problem> {
 
     let column = line.len() - rest.len() + 1;
     let rest = rest.trim_ascii_end();
-    let (frame, direction) = split_at_blanks(rest).unwrap_or((rest, b""));
-    let entry = entry(Text {
-        bytes: frame,
-        column,
-    })?;
+    let text = |bytes| Text { bytes, column };
+    let (entry, direction) = match entry(text(rest)) {
+        Ok(entry) => (entry, b"".as_slice()),
+        // Something is behind the frame, or it is wrong. To look for a blank in every line would take as long as to read it.
+        Err(problem) => {
+            let (frame, direction) = split_at_blanks(rest).ok_or(problem)?;
+            (entry(text(frame))?, direction)
+        }
+    };
     let direction = match direction {
         b"" => None,
         b"R" => Some(Direction::Received),
@@ -155,22 +159,42 @@ fn split_at_blanks(text: &[u8]) -> Option<(&[u8], &[u8])> {
 /// Microseconds of `seconds.decimals`; finer digits are cut off.
 pub(super) fn timestamp(text: &[u8]) -> Result<u64, Problem> {
     let (seconds, decimals) = split_at_byte(text, b'.').ok_or(Problem::Timestamp)?;
-    let digits = |text: &[u8]| !text.is_empty() && text.iter().all(u8::is_ascii_digit);
-    if !digits(seconds) || !decimals.iter().all(u8::is_ascii_digit) {
+    let (Some(whole), Some(_)) = (number(seconds), number(decimals)) else {
+        return Err(Problem::Timestamp);
+    };
+    if seconds.is_empty() {
         return Err(Problem::Timestamp);
     }
     if !(1..=9).contains(&decimals.len()) {
         return Err(Problem::Decimals(decimals.len()));
     }
-    let decimals = decimals.iter().chain(std::iter::repeat(&b'0')).take(6);
-    seconds
-        .iter()
-        .chain(decimals)
-        .try_fold(0_u64, |value, digit| {
-            value.checked_mul(10)?.checked_add(u64::from(digit - b'0'))
-        })
+    let decimals = &decimals[..decimals.len().min(6)];
+    let part = number(decimals).unwrap_or(0) * 10_u64.pow(6 - decimals.len() as u32);
+    (whole.checked_mul(1_000_000))
+        .and_then(|whole| whole.checked_add(part))
         .ok_or(Problem::TimestampRange)
 }
+
+/// The number of these digits, or the greatest if it is beyond; `None` if anything else is among them.
+fn number(digits: &[u8]) -> Option<u64> {
+    digits.iter().try_fold(0_u64, |value, digit| {
+        let digit = digit.wrapping_sub(b'0');
+        (digit <= 9).then(|| value.saturating_mul(10).saturating_add(digit.into()))
+    })
+}
+
+/// Value of each hexadecimal digit; more than 15 of any other byte.
+const DIGITS: [u8; 256] = {
+    let mut digits = [0xFF; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        if let Some(digit) = (byte as u8 as char).to_digit(16) {
+            digits[byte] = digit as u8;
+        }
+        byte += 1;
+    }
+    digits
+};
 
 /// Part of a line that knows its position.
 #[derive(Clone, Copy)]
@@ -206,23 +230,36 @@ impl<'a> Text<'a> {
 
     /// Data bytes into `buffer`, and how many of them.
     fn data(self, buffer: &'a mut [u8], allowed: &'static str) -> Result<&'a [u8], Problem> {
-        let found = self.bytes.len() / 2;
-        for (index, pair) in self.bytes.chunks(2).enumerate() {
-            let value = Text {
-                bytes: pair,
-                column: self.column + 2 * index,
-            }
-            .number()?;
-            if let Some(byte) = buffer.get_mut(index) {
-                *byte = value as u8;
+        let (pairs, odd) = self.bytes.as_chunks::<2>();
+        let mut all = 0;
+        for (byte, [high, low]) in buffer.iter_mut().zip(pairs) {
+            let (high, low) = (DIGITS[usize::from(*high)], DIGITS[usize::from(*low)]);
+            all |= high | low;
+            *byte = high << 4 | low;
+        }
+        let found = pairs.len();
+        if all > 0xF || found > buffer.len() || !odd.is_empty() {
+            return Err(self.wrong(Problem::Length { found, allowed }));
+        }
+        Ok(&buffer[..found])
+    }
+
+    /// What is wrong with these digits, the first of it first; `otherwise` if that is not the digits.
+    #[cold]
+    fn wrong(self, otherwise: Problem) -> Problem {
+        for (offset, &byte) in self.bytes.iter().enumerate() {
+            if DIGITS[usize::from(byte)] > 0xF {
+                return Problem::Hex {
+                    column: self.column + offset,
+                    found: char::from(byte),
+                };
             }
         }
-        if !self.bytes.len().is_multiple_of(2) {
-            return Err(Problem::OddDigits);
+        if self.bytes.len().is_multiple_of(2) {
+            otherwise
+        } else {
+            Problem::OddDigits
         }
-        buffer
-            .get(..found)
-            .ok_or(Problem::Length { found, allowed })
     }
 }
 

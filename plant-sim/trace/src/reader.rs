@@ -6,6 +6,7 @@ mod screen;
 
 use std::io::{self, BufRead, Chain, Cursor, Read};
 
+use memchr::memchr;
 use protocol::codec;
 use protocol::table;
 
@@ -170,7 +171,7 @@ impl<R: BufRead> Reader<R> {
             }
             let ended = self.buffer.ends_with(b"\n");
             let line = self.buffer.trim_ascii_end();
-            let is_joined = line.starts_with(b"(") && line.contains(&b'\r');
+            let is_joined = line.starts_with(b"(") && memchr(b'\r', line).is_some();
             if !ended && self.buffer.len() > MAX_LINE {
                 let problem = if screen::is_can_xl(line) {
                     Problem::CanXl

@@ -7,10 +7,8 @@ use sha2::{Digest, Sha256};
 
 use super::{
     Direction, ERROR_FLAG, Entry, ErrorFrame, FLAG_BRS, FLAG_ESI, Interface, LogHash, Record,
+    text::Line,
 };
-
-/// Longer than any line: timestamp, interface name, identifier, 64 data bytes, direction.
-const CAPACITY: usize = 256;
 
 /// Writes a log of one interface, line by line, and hashes it on the way.
 ///
@@ -20,6 +18,7 @@ pub struct Writer<W: Write> {
     sink: W,
     interface: Interface,
     hash: Sha256,
+    line: Line,
 }
 
 impl<W: Write> Writer<W> {
@@ -29,6 +28,7 @@ impl<W: Write> Writer<W> {
             sink,
             interface,
             hash: Sha256::new(),
+            line: Line::default(),
         }
     }
 
@@ -63,9 +63,17 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// Those of the sink.
     pub fn record(&mut self, record: &Record) -> io::Result<()> {
-        let mut line = Line::new(record.time_us, &record.interface);
+        let line = &mut self.line;
+        line.clear();
+        line.byte(b'(');
+        line.padded(record.time_us / 1_000_000, 10, b'0');
+        line.byte(b'.');
+        line.padded(record.time_us % 1_000_000, 6, b'0');
+        line.extend(b") ");
+        line.extend(record.interface.as_bytes());
+        line.byte(b' ');
         match &record.entry {
-            Entry::Frame(frame) => line.frame(frame),
+            Entry::Frame(frame) => put_frame(line, frame),
             Entry::Error(error) => {
                 line.hex(error.class & (ERROR_FLAG - 1) | ERROR_FLAG, 8);
                 line.byte(b'#');
@@ -101,90 +109,27 @@ impl<W: Write> Writer<W> {
     }
 }
 
-/// One line under construction. Formatted by hand: `core::fmt` would cost several times the rest of the writer.
-struct Line {
-    buffer: [u8; CAPACITY],
-    len: usize,
-}
-
-impl Line {
-    fn new(time_us: u64, interface: &Interface) -> Self {
-        let mut line = Self {
-            buffer: [0; CAPACITY],
-            len: 0,
-        };
-        line.byte(b'(');
-        line.decimal(time_us / 1_000_000, 10);
-        line.byte(b'.');
-        line.decimal(time_us % 1_000_000, 6);
-        line.extend(b") ");
-        line.extend(interface.as_bytes());
-        line.byte(b' ');
-        line
+/// As after the interface in a line of candump.
+fn put_frame(line: &mut Line, frame: &CanFrame) {
+    match frame.id() {
+        Id::Standard(id) => line.hex(id.as_raw().into(), 3),
+        Id::Extended(id) => line.hex(id.as_raw(), 8),
     }
-
-    fn frame(&mut self, frame: &CanFrame) {
-        match frame.id() {
-            Id::Standard(id) => self.hex(id.as_raw().into(), 3),
-            Id::Extended(id) => self.hex(id.as_raw(), 8),
-        }
-        self.byte(b'#');
-        match frame.kind() {
-            FrameKind::Classical { remote: false } => {}
-            FrameKind::Classical { remote: true } => {
-                self.byte(b'R');
-                // A length of zero is left out, as can-utils does.
-                if frame.dlc() > 0 {
-                    self.byte(b'0' + frame.dlc());
-                }
-            }
-            FrameKind::Fd { brs, esi } => {
-                self.byte(b'#');
-                let flags = (u8::from(brs) * FLAG_BRS) | (u8::from(esi) * FLAG_ESI);
-                self.hex(flags.into(), 1);
+    line.byte(b'#');
+    match frame.kind() {
+        FrameKind::Classical { remote: false } => {}
+        FrameKind::Classical { remote: true } => {
+            line.byte(b'R');
+            // A length of zero is left out, as can-utils does.
+            if frame.dlc() > 0 {
+                line.byte(b'0' + frame.dlc());
             }
         }
-        self.data(frame.data());
-    }
-
-    fn bytes(&self) -> &[u8] {
-        &self.buffer[..self.len]
-    }
-
-    fn byte(&mut self, byte: u8) {
-        self.buffer[self.len] = byte;
-        self.len += 1;
-    }
-
-    fn extend(&mut self, bytes: &[u8]) {
-        self.buffer[self.len..][..bytes.len()].copy_from_slice(bytes);
-        self.len += bytes.len();
-    }
-
-    /// Decimal digits, padded with leading zeros to `width`; a larger number takes as many as it needs.
-    fn decimal(&mut self, mut value: u64, width: usize) {
-        let mut digits = [b'0'; 20];
-        let mut first = digits.len();
-        while value > 0 {
-            first -= 1;
-            digits[first] = b'0' + (value % 10) as u8;
-            value /= 10;
-        }
-        self.extend(&digits[first.min(digits.len() - width)..]);
-    }
-
-    /// The low `digits` hexadecimal digits.
-    fn hex(&mut self, value: u32, digits: u32) {
-        for digit in (0..digits).rev() {
-            self.byte(HEX[(value >> (4 * digit) & 0xF) as usize]);
+        FrameKind::Fd { brs, esi } => {
+            line.byte(b'#');
+            let flags = (u8::from(brs) * FLAG_BRS) | (u8::from(esi) * FLAG_ESI);
+            line.hex(flags.into(), 1);
         }
     }
-
-    fn data(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.hex(byte.into(), 2);
-        }
-    }
+    line.data(frame.data());
 }
-
-const HEX: &[u8; 16] = b"0123456789ABCDEF";

@@ -10,6 +10,7 @@ use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use flate2::read::MultiGzDecoder;
+use memchr::memchr;
 use plant_sim::{interrupt, say};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use trace::select::Selection;
@@ -41,6 +42,8 @@ pub(super) struct Source {
     /// Times of the first record and of the last one.
     span_us: Option<(u64, u64)>,
     interfaces: BTreeSet<Interface>,
+    /// That of the last record.
+    newest: Option<Interface>,
     records: u64,
     selected: u64,
     unreadable: u64,
@@ -121,6 +124,7 @@ impl Source {
             size: Some(data.len()).filter(|&size| size > 0),
             span_us: None,
             interfaces: BTreeSet::new(),
+            newest: None,
             records: 0,
             selected: 0,
             unreadable: 0,
@@ -138,7 +142,10 @@ impl Source {
                     self.records += 1;
                     let (first, _) = self.span_us.unwrap_or((record.time_us, 0));
                     self.span_us = Some((first, record.time_us));
-                    self.interfaces.insert(record.interface);
+                    if self.newest != Some(record.interface) {
+                        self.newest = Some(record.interface);
+                        self.interfaces.insert(record.interface);
+                    }
                     if self.selection.interface(&record) {
                         self.selected += u64::from(self.counts(&record));
                         return Some(Ok(record));
@@ -198,7 +205,7 @@ impl Source {
 
     /// Whether the next record has to be waited for.
     pub(super) fn is_drained(&self) -> bool {
-        !self.reader.source().buffer().contains(&b'\n')
+        memchr(b'\n', self.reader.source().buffer()).is_none()
     }
 
     /// File and line read last.

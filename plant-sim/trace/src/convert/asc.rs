@@ -1,14 +1,13 @@
 //! Vector ASC: the text log of CANalyzer and CANoe. Times count from the date in the header. That is the date of the
 //! first record in local time, as readers expect it, in whole milliseconds: the first time holds the rest.
 
-use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use chrono::{DateTime, Local};
 use protocol::frame::{CanFrame, FrameKind};
 
 use super::Interfaces;
-use crate::decode::Seconds;
+use crate::text::Line;
 use crate::{Direction, Entry, Record};
 
 /// Flags of a `CANFD` line: FD format, bit rate switch, error state indicator.
@@ -21,6 +20,8 @@ pub(super) struct Asc<W> {
     pub(super) sink: W,
     interfaces: Interfaces,
     start_us: Option<u64>,
+    line: Line,
+    id: Line,
 }
 
 impl<W: Write> Asc<W> {
@@ -29,6 +30,8 @@ impl<W: Write> Asc<W> {
             sink,
             interfaces: Interfaces::default(),
             start_us: None,
+            line: Line::default(),
+            id: Line::default(),
         }
     }
 
@@ -42,14 +45,25 @@ impl<W: Write> Asc<W> {
                 start_us
             }
         };
-        // Channels are counted from 1. A clock set back to before the start stays at the start.
+        let line = &mut self.line;
+        line.clear();
+        // A clock set back to before the start stays at the start.
+        let time_us = record.time_us.saturating_sub(start_us);
+        line.padded(time_us / 1_000_000, 4, b' ');
+        line.byte(b'.');
+        line.padded(time_us % 1_000_000, 6, b'0');
+        line.byte(b' ');
+        // Channels are counted from 1.
         let channel = self.interfaces.number(record.interface).0 + 1;
-        let time = Seconds(record.time_us.saturating_sub(start_us)).to_string();
-        let content = match &record.entry {
-            Entry::Frame(frame) => frame_line(channel, record.direction, frame),
-            Entry::Error(_) => format!("{channel}  ErrorFrame"),
-        };
-        writeln!(self.sink, "{time:>11} {content}")
+        match &record.entry {
+            Entry::Frame(frame) => self.put_frame(channel, record.direction, frame),
+            Entry::Error(_) => {
+                line.integer(channel);
+                line.word("  ErrorFrame");
+            }
+        }
+        self.line.byte(b'\n');
+        self.sink.write_all(self.line.bytes())
     }
 
     pub(super) fn finish(mut self) -> io::Result<W> {
@@ -70,40 +84,63 @@ impl<W: Write> Asc<W> {
     }
 }
 
-fn frame_line(channel: usize, direction: Option<Direction>, frame: &CanFrame) -> String {
-    let way = direction.unwrap_or(Direction::Received).name();
-    let extended = if frame.is_extended() { "x" } else { "" };
-    let id = format!("{:X}{extended}", frame.raw_id());
-    let length = frame.data().len();
-    let mut line = match frame.kind() {
-        FrameKind::Classical { remote: false } => {
-            format!("{channel}  {id:<15} {way}   d {length:x}")
+/// Flags after the data of an FD line in front of which are duration and length in bits, and behind them the CRC and four words
+/// of bit timing; unknown is 0.
+fn flags(brs: bool, esi: bool) -> u32 {
+    FLAG_FDF | (u32::from(brs) * FLAG_BRS) | (u32::from(esi) * FLAG_ESI)
+}
+
+impl<W> Asc<W> {
+    fn put_frame(&mut self, channel: usize, direction: Option<Direction>, frame: &CanFrame) {
+        let Self { line, id, .. } = self;
+        let way = direction.unwrap_or(Direction::Received).name();
+        id.clear();
+        id.hex(frame.raw_id(), digits(frame.raw_id()));
+        if frame.is_extended() {
+            id.byte(b'x');
         }
-        FrameKind::Classical { remote: true } => {
-            return format!("{channel}  {id:<15} {way}   r {:x}", frame.dlc());
+        match frame.kind() {
+            FrameKind::Classical { remote } => {
+                line.integer(channel);
+                line.word("  ");
+                line.extend(id.bytes());
+                line.blanks(15_usize.saturating_sub(id.bytes().len()));
+                line.byte(b' ');
+                line.word(way);
+                line.word(if remote { "   r " } else { "   d " });
+                line.hex(frame.dlc().into(), 1);
+                line.spaced(frame.data());
+            }
+            FrameKind::Fd { brs, esi } => {
+                line.word("CANFD ");
+                line.padded(channel, 3, b' ');
+                line.byte(b' ');
+                line.word(way);
+                line.word("   ");
+                line.blanks(8_usize.saturating_sub(id.bytes().len()));
+                line.extend(id.bytes());
+                line.blanks(34);
+                line.byte(b'0' + u8::from(brs));
+                line.byte(b' ');
+                line.byte(b'0' + u8::from(esi));
+                line.byte(b' ');
+                line.byte(b"0123456789abcdef"[usize::from(frame.dlc())]);
+                line.byte(b' ');
+                line.padded(frame.data().len(), 2, b' ');
+                line.spaced(frame.data());
+                line.word("        0    0 ");
+                let flags = flags(brs, esi);
+                line.blanks(8 - digits(flags) as usize);
+                line.hex(flags, digits(flags));
+                line.word("        0        0        0        0        0");
+            }
         }
-        FrameKind::Fd { brs, esi } => format!(
-            "CANFD {channel:>3} {way}   {id:>8} {:>32} {} {} {:x} {length:>2}",
-            "",
-            u8::from(brs),
-            u8::from(esi),
-            frame.dlc()
-        ),
-    };
-    for byte in frame.data() {
-        // Writing to a string cannot fail.
-        let _ = write!(line, " {byte:02X}");
     }
-    if let FrameKind::Fd { brs, esi } = frame.kind() {
-        let flags = FLAG_FDF | (u32::from(brs) * FLAG_BRS) | (u32::from(esi) * FLAG_ESI);
-        // Duration, length in bits, flags, CRC and four words of bit timing; unknown is 0.
-        let _ = write!(
-            line,
-            " {:>8} {:>4} {flags:>8X} {:>8} {:>8} {:>8} {:>8} {:>8}",
-            0, 0, 0, 0, 0, 0, 0
-        );
-    }
-    line
+}
+
+/// Hexadecimal digits that a number takes.
+fn digits(value: u32) -> u32 {
+    value.checked_ilog2().map_or(1, |bits| bits / 4 + 1)
 }
 
 /// Local time of a time since 1970; one beyond the calendar becomes its start.

@@ -2,6 +2,7 @@
 //!
 //! The screen shows the bit rate switch only with `-x`; otherwise it is assumed to be set, as on nearly every FD bus.
 
+use memchr::memchr2;
 use protocol::frame::{CanFrame, FD_MAX};
 
 use crate::line::{Problem, fd, id, split_at_byte, timestamp};
@@ -12,6 +13,10 @@ const ABSOLUTE: usize = 10;
 
 /// Whether a line is screen output: there is no `#` where a log has identifier and data.
 pub(super) fn is_screen(line: &[u8]) -> bool {
+    // A log has no brackets.
+    if memchr2(b'[', b'{', line).is_none() {
+        return false;
+    }
     let frame = match split_at_byte(line, b')') {
         Some((_, rest)) => words(rest).nth(1),
         None => words(line).nth(1),
