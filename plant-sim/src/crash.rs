@@ -156,6 +156,7 @@ pub fn plant(config: &RunConfig, image: &Path, planted: Planted) -> Result<Seen,
             Planted::Fault(_) => Channel::Fifo,
             Planted::Reset(channel) => channel,
         },
+        in_step: true,
         ..Options::default()
     };
     let controller = Qemu::start(rig.controller(), &options).map_err(|error| text(&error))?;

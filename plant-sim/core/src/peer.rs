@@ -33,6 +33,14 @@ pub trait Peer {
         world: &mut World,
         out: &mut Outbox,
     ) -> Result<(), PeerError>;
+
+    /// Checks what it has left for later. The run has ended.
+    ///
+    /// # Errors
+    /// Those of [`Peer::poll`].
+    fn finish(&mut self) -> Result<(), PeerError> {
+        Ok(())
+    }
 }
 
 /// Why a run cannot continue with a peer.
@@ -60,6 +68,10 @@ impl<P: Peer + ?Sized> Peer for &mut P {
     ) -> Result<(), PeerError> {
         (**self).poll(now, received, world, out)
     }
+
+    fn finish(&mut self) -> Result<(), PeerError> {
+        (**self).finish()
+    }
 }
 
 /// A peer that is inspected while it runs.
@@ -76,5 +88,9 @@ impl<P: Peer + ?Sized> Peer for Rc<RefCell<P>> {
         out: &mut Outbox,
     ) -> Result<(), PeerError> {
         self.borrow_mut().poll(now, received, world, out)
+    }
+
+    fn finish(&mut self) -> Result<(), PeerError> {
+        self.borrow_mut().finish()
     }
 }

@@ -220,6 +220,9 @@ impl<'p> Rig<'p> {
                 };
             }
         }
+        for seat in &mut self.seats {
+            seat.peer.finish()?;
+        }
         outcome.map_err(RunError::from)
     }
 

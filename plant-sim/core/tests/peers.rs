@@ -281,3 +281,40 @@ fn the_first_fault_is_reported_and_the_arm_comes_to_rest() {
     let last = seen.truth.unwrap().plant;
     assert!(last.qd.iter().all(|qd| qd.abs() < 1e-3), "{last:?}");
 }
+
+/// A controller in whose answers something is found wrong after the run, as on a board that is compared behind.
+struct FoundOut(InProcess);
+
+impl Peer for FoundOut {
+    fn wake(&self) -> Option<Instant> {
+        self.0.wake()
+    }
+
+    fn poll(
+        &mut self,
+        now: Instant,
+        received: Option<&CanFrame>,
+        world: &mut World,
+        out: &mut Outbox,
+    ) -> Result<(), PeerError> {
+        self.0.poll(now, received, world, out)
+    }
+
+    fn finish(&mut self) -> Result<(), PeerError> {
+        Err(PeerError {
+            who: "late".into(),
+            what: "differs".into(),
+        })
+    }
+}
+
+#[test]
+fn what_a_peer_finds_out_after_the_end_fails_the_run() {
+    let connect = |config| Ok(FoundOut(InProcess::new(config)));
+    let summary = with_controller(&gate(), connect, &mut (), &mut ()).unwrap();
+    assert!(!summary.completed);
+    assert_eq!(
+        summary.error.as_deref(),
+        Some("the controller late differs")
+    );
+}

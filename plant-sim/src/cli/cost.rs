@@ -70,6 +70,7 @@ fn measure(args: &CostArgs, image: Option<&PathBuf>, program: &str) -> Result<Co
         image: Some(image),
         channel: Channel::Fifo,
         count: Some(Rc::clone(&costs)),
+        in_step: false,
     };
     let summary = with_controller(
         &config,

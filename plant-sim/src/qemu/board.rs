@@ -5,7 +5,7 @@
 //! that far.
 
 use std::fs::{self, File};
-use std::io::{self, BufReader, Read, Write};
+use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
@@ -47,8 +47,8 @@ const LOG: &str = "log";
 pub(super) struct Board {
     /// Setup record, sent at every start.
     setup: [u8; SETUP_LEN],
-    /// `None` once the channel is closed.
-    requests: Option<ChildStdin>,
+    /// Sent together when there is an answer to wait for. `None` once the channel is closed.
+    requests: Option<BufWriter<ChildStdin>>,
     replies: BufReader<ChildStdout>,
     /// The serial line for frames, unless they use the FIFOs.
     serial: Option<Serial<UnixStream>>,
@@ -114,7 +114,7 @@ impl Board {
         };
         command.args(["-serial", &format!("file:{LOG}")]);
         let mut child = command.spawn().map_err(|error| no_emulator(&error))?;
-        let requests = child.stdin.take();
+        let requests = child.stdin.take().map(BufWriter::new);
         let replies = child
             .stdout
             .take()
@@ -166,18 +166,14 @@ impl Board {
         Ok(stop)
     }
 
-    /// Sends a frame over the UART and appends the answers to `sent`.
-    pub(super) fn exchange(
-        &mut self,
-        frame: &CanFrame,
-        sent: &mut Vec<CanFrame>,
-    ) -> Result<(), PeerError> {
-        self.serial(|serial| serial.exchange(frame, sent))
-    }
-
-    /// Sends a frame over the UART that resets the board: there is no answer.
+    /// Sends a frame over the UART.
     pub(super) fn send(&mut self, frame: &CanFrame) -> Result<(), PeerError> {
         self.serial(|serial| serial.send(frame))
+    }
+
+    /// Waits for the answer to a frame sent over the UART, and appends its frames to `sent`.
+    pub(super) fn answer_line(&mut self, sent: &mut Vec<CanFrame>) -> Result<(), PeerError> {
+        self.serial(|serial| serial.answer(sent))
     }
 
     /// Closes the bus on the UART; returns the number of bytes that the board's receiver has lost.
@@ -206,12 +202,13 @@ impl Board {
         self.answer(sent)
     }
 
-    /// Sends a request that has no answer: the board restarts.
+    /// Sends a request.
     pub(super) fn send_request(&mut self, request: &Request) -> Result<(), PeerError> {
         self.say(&request.to_bytes())
     }
 
-    fn answer(&mut self, sent: &mut Vec<CanFrame>) -> Result<Measured, PeerError> {
+    /// Waits for the answer to a request: appends its frames to `sent` and returns the measurements.
+    pub(super) fn answer(&mut self, sent: &mut Vec<CanFrame>) -> Result<Measured, PeerError> {
         match self.wait(|board| listen(&mut board.replies, sent))? {
             Said::Reply(measured) => Ok(measured),
             Said::Greeting(stop) => Err(failure(format!(
@@ -225,7 +222,10 @@ impl Board {
     /// Waits for the board, supervised by the thread.
     fn wait<T>(&mut self, what: impl FnOnce(&mut Self) -> io::Result<T>) -> Result<T, PeerError> {
         self.watch.waiting.store(true, Ordering::Relaxed);
-        let answer = what(self);
+        let answer = match &mut self.requests {
+            Some(requests) => requests.flush().and_then(|()| what(self)),
+            None => what(self),
+        };
         self.watch.waiting.store(false, Ordering::Relaxed);
         self.watch.answers.fetch_add(1, Ordering::Relaxed);
         answer.map_err(|error| self.ended(&error))
@@ -271,7 +271,9 @@ impl Board {
     fn close(&mut self) -> Option<Ended> {
         self.requests = None;
         self.watch.closing.store(true, Ordering::Relaxed);
-        self.watcher.take()?.join().ok()
+        let watcher = self.watcher.take()?;
+        watcher.thread().unpark();
+        watcher.join().ok()
     }
 }
 

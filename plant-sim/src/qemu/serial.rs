@@ -42,17 +42,7 @@ impl<S: Read + Write> Serial<S> {
         Ok(())
     }
 
-    /// Sends a frame and appends the frames that the board sends before its acknowledgement.
-    pub(super) fn exchange(
-        &mut self,
-        frame: &CanFrame,
-        sent: &mut Vec<CanFrame>,
-    ) -> io::Result<()> {
-        self.send(frame)?;
-        self.answer(sent)
-    }
-
-    /// Sends a frame that has no answer.
+    /// Sends a frame.
     pub(super) fn send(&mut self, frame: &CanFrame) -> io::Result<()> {
         self.say(Line::Frame(*frame))
     }
@@ -66,7 +56,8 @@ impl<S: Read + Write> Serial<S> {
         self.stream.write_all(Text::from(line).as_bytes())
     }
 
-    fn answer(&mut self, sent: &mut Vec<CanFrame>) -> io::Result<()> {
+    /// Appends the frames that the board sends before it acknowledges the oldest line.
+    pub(super) fn answer(&mut self, sent: &mut Vec<CanFrame>) -> io::Result<()> {
         loop {
             let byte = self.byte()?;
             let line = match self.parser.push(byte) {
@@ -123,7 +114,7 @@ mod tests {
         let mut serial = Serial::new(Script(io::Cursor::new(answer.to_vec()), Vec::new()));
         let frame = CanFrame::fd(StandardId::new(0x1C0).unwrap(), &[1, 2], true).unwrap();
         let mut sent = Vec::new();
-        let result = serial.exchange(&frame, &mut sent);
+        let result = serial.send(&frame).and_then(|()| serial.answer(&mut sent));
         (result, sent, serial.stream.1)
     }
 

@@ -10,8 +10,10 @@ use std::time::Duration;
 const LOOK: Duration = Duration::from_millis(20);
 /// Checks without an answer after which the board counts as hung: 20 s. An answer takes microseconds.
 const PATIENCE: u32 = 1000;
-/// Checks for which a child may end by itself once the channel is closed: 2 s.
-const FAREWELL: u32 = 100;
+/// The same once the channel is closed, when somebody waits for the end.
+const CLOSE_LOOK: Duration = Duration::from_millis(1);
+/// Such checks for which a child may end by itself: 2 s.
+const FAREWELL: u32 = 2000;
 
 /// State shared with the supervising thread.
 #[derive(Debug, Default)]
@@ -45,14 +47,15 @@ pub(super) fn supervise(mut child: Child, watch: &Watch) -> Ended {
             }
             _ => (answers, 0),
         };
-        farewell += u32::from(watch.closing.load(Ordering::Relaxed));
+        let is_closing = watch.closing.load(Ordering::Relaxed);
+        farewell += u32::from(is_closing);
         if seen.1 > PATIENCE || farewell > FAREWELL {
             // SIGKILL: a blocked emulator ignores anything less.
             let _ = child.kill();
             let _ = child.wait();
             break Ended::Hung;
         }
-        thread::sleep(LOOK);
+        thread::park_timeout(if is_closing { CLOSE_LOOK } else { LOOK });
     }
 }
 

@@ -181,4 +181,8 @@ impl<P: Peer> Peer for Faulty<P> {
         self.sent = sent;
         Ok(())
     }
+
+    fn finish(&mut self) -> Result<(), PeerError> {
+        self.peer.finish()
+    }
 }

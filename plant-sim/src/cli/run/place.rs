@@ -134,6 +134,7 @@ impl PlaceArgs {
                     Some(ChannelChoice::Uart) => Channel::Uart,
                 },
                 count: None,
+                in_step: false,
             })),
         }
     }

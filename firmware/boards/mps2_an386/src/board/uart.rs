@@ -4,7 +4,7 @@
 
 use core::ptr;
 
-use channel::ring::Ring;
+use channel::ring::{CAPACITY, Ring};
 
 /// UART 0, which carries frames.
 pub(crate) const FRAMES: Uart = Uart(0x4000_4000);
@@ -72,15 +72,18 @@ impl Uart {
     }
 }
 
-/// The receive interrupt of UART 0. STATE and INTCLEAR clear what is written as 1.
+/// The receive interrupt of UART 0: takes whatever has arrived until it has looked. STATE and INTCLEAR clear what is written as 1.
 pub(crate) fn receive() {
     FRAMES.write(INTCLEAR, INT_RX);
-    let state = FRAMES.read(STATE);
-    if state & STATE_RX_OVERRUN != 0 {
-        FRAMES.write(STATE, STATE_RX_OVERRUN);
-        RECEIVED.lose();
-    }
-    if state & STATE_RX_FULL != 0 {
+    for _ in 0..CAPACITY {
+        let state = FRAMES.read(STATE);
+        if state & STATE_RX_OVERRUN != 0 {
+            FRAMES.write(STATE, STATE_RX_OVERRUN);
+            RECEIVED.lose();
+        }
+        if state & STATE_RX_FULL == 0 {
+            return;
+        }
         RECEIVED.push(FRAMES.read(DATA) as u8);
     }
 }
