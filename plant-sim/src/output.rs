@@ -15,6 +15,9 @@ use tempfile::NamedTempFile;
 use place::{Place, folder, place};
 pub use place::{distinct, refuse_tilde};
 
+/// Bytes that are written at once: a trace and its truth take half a kilobyte per sample.
+const BUFFER: usize = 1 << 16;
+
 /// Results cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
@@ -104,7 +107,7 @@ impl File {
             .map_err(without_path)
             .map_err(OutputError::at(&path))?;
         Ok(Self {
-            sink: Sink::New(BufWriter::new(file)),
+            sink: Sink::New(BufWriter::with_capacity(BUFFER, file)),
             path,
         })
     }
@@ -160,7 +163,7 @@ fn through(path: &Path) -> Result<BufWriter<fs::File>, OutputError> {
         .and_then(|file| {
             let flags = rustix::fs::fcntl_getfl(&file)?;
             rustix::fs::fcntl_setfl(&file, flags - OFlags::NONBLOCK)?;
-            Ok(BufWriter::new(file))
+            Ok(BufWriter::with_capacity(BUFFER, file))
         })
         .map_err(|error| match rustix::io::Errno::from_io_error(&error) {
             Some(rustix::io::Errno::NXIO) => OutputError::Taken {

@@ -112,7 +112,11 @@ pub const TRUTH_COLUMNS: [(&str, &str, &str); 25] = [
 ];
 
 /// One row per sample: actual motion of the robot and its reference.
-pub struct TruthLog<W: Write>(W);
+pub struct TruthLog<W: Write> {
+    sink: W,
+    /// A row under construction.
+    row: String,
+}
 
 impl<W: Write> TruthLog<W> {
     /// A table with its header that goes into `sink`.
@@ -122,7 +126,10 @@ impl<W: Write> TruthLog<W> {
     pub fn new(mut sink: W) -> io::Result<Self> {
         let header = TRUTH_COLUMNS.map(|(name, _, _)| name).join(",");
         writeln!(sink, "{header}")?;
-        Ok(Self(sink))
+        Ok(Self {
+            sink,
+            row: String::new(),
+        })
     }
 
     /// The sink, flushed.
@@ -130,8 +137,8 @@ impl<W: Write> TruthLog<W> {
     /// # Errors
     /// Those of the sink.
     pub fn finish(mut self) -> io::Result<W> {
-        self.0.flush()?;
-        Ok(self.0)
+        self.sink.flush()?;
+        Ok(self.sink)
     }
 }
 
@@ -139,7 +146,8 @@ impl<W: Write> Observer for TruthLog<W> {
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         // The standard library's float formatting would take a third of the run's time.
         let mut digits = zmij::Buffer::new();
-        self.0.write_all(digits.format(truth.plant.t).as_bytes())?;
+        self.row.clear();
+        self.row.push_str(digits.format(truth.plant.t));
         for group in [
             &truth.plant.q,
             &truth.plant.qd,
@@ -149,10 +157,11 @@ impl<W: Write> Observer for TruthLog<W> {
             &truth.plant.tool,
         ] {
             for value in group {
-                self.0.write_all(b",")?;
-                self.0.write_all(digits.format(*value).as_bytes())?;
+                self.row.push(',');
+                self.row.push_str(digits.format(*value));
             }
         }
-        self.0.write_all(b"\n")
+        self.row.push('\n');
+        self.sink.write_all(self.row.as_bytes())
     }
 }
