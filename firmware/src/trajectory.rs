@@ -8,6 +8,7 @@
 //! profile superimposed on it, and one time scale for all of it. Nothing is tabulated, so it
 //! costs a few hundred bytes and can be evaluated at any instant and any control rate.
 
+mod caps;
 pub mod clock;
 pub mod path;
 pub mod planner;

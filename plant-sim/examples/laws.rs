@@ -64,10 +64,13 @@ fn row(name: &str, law: &str, rate: f64) {
     let settling = summary
         .settle_time_s
         .map_or("> dwell".into(), |time| format!("{:.1}", time.max * 1e3));
-    let last = summary.final_error_mm.max.unwrap_or(f64::NAN);
+    let last = summary
+        .final_error_mm
+        .max
+        .map_or("-".into(), |error| format!("{error:.4}"));
     let error = summary.tracking_error_mm;
     println!(
-        "| {law} | {model} | {rate} | {cycle} | {:.3} | {:.3} | {settling} | {last:.4} |",
+        "| {law} | {model} | {rate} | {cycle} | {:.3} | {:.3} | {settling} | {last} |",
         error.max, error.rms
     );
 }

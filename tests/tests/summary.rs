@@ -74,13 +74,14 @@ fn a_motor_at_its_limit_is_seen_as_long_as_it_is_there() {
     assert_eq!((summary.cycles, summary.cycles_asked), (0, 1));
 }
 
-/// The wrist turns by 3 rad no faster than its limits of speed (29.7 rad/s) and acceleration (600 rad/s2) allow.
+/// The wrist turns by 3 rad no faster than its limit of speed (29.7 rad/s) and its torque allow: 30 N m, and 0.0204 kg m2 of shaft
+/// and rotors, which is less than it has to turn.
 #[test]
 fn a_turn_on_the_spot_takes_the_time_that_the_wrist_needs() {
     let summary = run(scenario(
         "[[cycle]]\nline = { to = [0.5, 0.1, -0.2, 3.0] }\n[[cycle]]\ndwell = 0.1\n",
     ));
-    let fastest = 3.0 / 29.670597283903604 + 29.670597283903604 / 600.0;
+    let fastest = 3.0 / 29.670597283903604 + 29.670597283903604 * 0.0204 / 30.0;
     let time = summary.cycle_time_s.unwrap().mean;
     let [cycle] = summary.each_cycle[..] else {
         panic!("one cycle")

@@ -83,15 +83,28 @@ pub struct JointLimits {
     pub upper: Vector4<f32>,
     /// Greatest speed.
     pub velocity: Vector4<f32>,
-    /// Greatest acceleration.
+    /// Greatest acceleration, to protect the gears; [`JointLimits::NONE`] where torque alone is the limit.
     pub acceleration: Vector4<f32>,
-    /// Greatest jerk.
+    /// Greatest jerk; likewise.
     pub jerk: Vector4<f32>,
     /// Greatest effort (N m, lift N).
     pub effort: Vector4<f32>,
+    /// Time in which a motor takes up its greatest torque (s).
+    pub effort_rise_time: Vector4<f32>,
     /// Continuous effort (N m, lift N), as a root mean square. Only checked and stored, for a future thermal model of
     /// the motors; no law or plan uses it yet.
     pub effort_continuous: Vector4<f32>,
+}
+
+impl JointLimits {
+    /// Stands for an acceleration or a jerk that is not limited.
+    pub const NONE: f32 = f32::MAX;
+
+    /// Whether the acceleration or the jerk of any axis is limited.
+    #[must_use]
+    pub fn caps_acceleration(&self) -> bool {
+        self.acceleration.min() < Self::NONE || self.jerk.min() < Self::NONE
+    }
 }
 
 /// Motors and transmissions, in the order of the axes. Motor 3 drives the nut of the ball-screw spline.
@@ -197,9 +210,20 @@ pub const IRB_930: ArmModel = ArmModel {
         upper: Vector4::new(2.617_993_9, 2.530_727_4, 0.3, 6.981_317),
         // 440, 700 and 1700 degrees per second.
         velocity: Vector4::new(7.679_448_7, 12.217_305, 2.2, 29.670_597),
-        acceleration: Vector4::new(60.0, 120.0, 60.0, 600.0),
-        jerk: Vector4::new(2_500.0, 7_500.0, 10_000.0, 40_000.0),
+        acceleration: Vector4::new(
+            JointLimits::NONE,
+            JointLimits::NONE,
+            JointLimits::NONE,
+            JointLimits::NONE,
+        ),
+        jerk: Vector4::new(
+            JointLimits::NONE,
+            JointLimits::NONE,
+            JointLimits::NONE,
+            JointLimits::NONE,
+        ),
         effort: Vector4::new(640.0, 400.0, 860.0, 30.0),
+        effort_rise_time: Vector4::new(0.010, 0.010, 0.010, 0.010),
         effort_continuous: Vector4::new(216.0, 127.0, 287.0, 10.2),
     },
     drive: DriveTrain {

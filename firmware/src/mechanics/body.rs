@@ -3,12 +3,15 @@
 use core::f32::consts::FRAC_PI_2;
 use core::ops::Mul;
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix4, Vector4, Vector5};
 
 use crate::mechanics::arm::{ArmModel, Payload};
 use crate::mechanics::dynamics::drive::Drive;
 use crate::mechanics::dynamics::lagrange::Lagrange;
 use crate::mechanics::kinematics::Trig;
+
+/// Torques of the four joints (N m, lift N) and of the motor of the wrist (N m), which carries part of the lift's force, too.
+pub type Torques = Vector5<f32>;
 
 /// Everything that depends on the payload, lumped once instead of in every tick.
 #[derive(Clone, Copy, Debug)]
@@ -17,8 +20,10 @@ pub struct Body {
     pub lagrange: Lagrange,
     /// Motors, gears, coupling and friction.
     pub drive: Drive,
-    /// Greatest efforts: of the joints, as they and the motors that turn one joint each allow.
-    pub effort_limit: Vector4<f32>,
+    /// Greatest torques: of the joints, as they and the motors that turn one joint each allow, and of the motor of the wrist.
+    pub torque_limit: Torques,
+    /// How fast they change at the most, 1/s.
+    pub torque_rate: Torques,
     /// Rotor inertia seen at the joints, A^T Jm A.
     rotor: Matrix4<f32>,
     /// Inertia of each axis by itself with the elbow at a right angle, for laws without a model.
@@ -31,10 +36,21 @@ impl Body {
         let drive = Drive::new(&arm.drive);
         let mut motors = drive.own_torque(&arm.drive.motor_torque_limit).abs();
         motors.w = f32::MAX;
+        let joint = arm.limits.effort.inf(&motors);
+        let wrist = arm.drive.motor_torque_limit.w;
+        let torque_limit = Torques::new(joint.x, joint.y, joint.z, joint.w, wrist);
+        let rise = &arm.limits.effort_rise_time;
         let mut body = Self {
             lagrange: Lagrange::new(arm, payload),
             drive,
-            effort_limit: arm.limits.effort.inf(&motors),
+            torque_limit,
+            torque_rate: Torques::new(
+                torque_limit.x / rise.x,
+                torque_limit.y / rise.y,
+                torque_limit.z / rise.z,
+                torque_limit.w / rise.w,
+                torque_limit.a / rise.w,
+            ),
             rotor: drive.rotor_inertia(),
             nominal_inertia: Vector4::zeros(),
         };

@@ -43,6 +43,14 @@ impl Trig {
         Self::in_line(q)
     }
 
+    /// The part that dynamics need, of elbow and wrist; the rest is not a number.
+    // Out of line, like the above.
+    #[inline(never)]
+    #[must_use]
+    pub fn relative(q: &Vector4<f32>) -> Self {
+        Self::in_line(&Vector4::new(f32::NAN, q.y, q.z, q.w))
+    }
+
     /// Inlined variant of [`Trig::new`]: components that the caller does not use are optimised away. Dynamics never
     /// need theta1.
     #[inline(always)]

@@ -1,11 +1,8 @@
 //! The clock of a trajectory: runs with the samples, or is braked to a stop on the path.
 
-use super::{Rates, Reference};
-use crate::mechanics::arm::JointLimits;
+use super::Rates;
+use super::torque_budget::Braking;
 use crate::mechanics::math::sqrt;
-
-/// Share of the jerk limit that a stop may use: the move's own jerk keeps the rest.
-const STOP_JERK_SHARE: f32 = 0.5;
 
 /// Trajectory time in whole samples plus a fraction, so that long moves keep their resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,41 +53,17 @@ impl Clock {
         }
     }
 
-    /// Chooses the next slope of a stop: as steep as `steepest` (of the torque) and no joint's acceleration passes its limit,
-    /// as its jerk allows, and flattening towards rest. The arm stays on its path. `reference` is the trajectory's own, before
-    /// [`Clock::apply`].
-    pub fn brake(
-        &mut self,
-        reference: &Reference,
-        steepest: f32,
-        limits: &JointLimits,
-        period: f32,
-    ) {
-        let mut steepest = steepest;
-        let mut bend = f32::MAX;
-        for (((qd, qdd), acceleration), jerk) in reference
-            .qd
-            .iter()
-            .zip(reference.qdd.iter())
-            .zip(limits.acceleration.iter())
-            .zip(limits.jerk.iter())
-        {
-            let speed = qd.abs();
-            if speed * period > f32::EPSILON {
-                let own = self.time_scale * self.time_scale * if *qd > 0.0 { *qdd } else { -*qdd };
-                steepest = steepest.min((acceleration + own).max(0.0) / speed);
-                bend = bend.min(STOP_JERK_SHARE * jerk / speed);
-            }
-        }
-        if bend == f32::MAX {
+    /// Chooses the next slope of a stop: as steep as the torque allows, no sooner than it can be built up, and flattening
+    /// towards rest. The arm stays on its path.
+    pub fn brake(&mut self, Braking { slope, bend }: Braking, period: f32) {
+        if !bend.is_finite() {
             // At rest on the trajectory: nothing to brake.
             self.time_scale = 0.0;
             self.slope = 0.0;
             return;
         }
         let flare = sqrt(2.0 * bend * self.time_scale);
-        let next = (-self.slope + bend * period).min(steepest).min(flare);
-        self.slope = -next;
+        self.slope = -(bend * period - self.slope).min(slope).min(flare);
     }
 
     /// The velocities and accelerations of the trajectory as the clock runs through them, `later` seconds from now.

@@ -24,19 +24,19 @@ mod verify;
 use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
-use super::Trajectory;
 use super::path::{Path, PathPoint};
 use super::profile::{Bounds, SCurve};
 use super::request::{Request, Target, from_path};
 use super::torque_budget::TorqueBudget;
+use super::{Reference, Trajectory};
 use crate::mechanics::arm::ArmModel;
 use jump::{Chamfer, Jump};
-use verify::LINE_STEPS;
+use verify::{Before, LINE_STEPS};
 
 /// Survey points on a line.
 const SURVEY_POINTS: u8 = 24;
 /// Corrections of the two accelerations.
-const ROUNDS: u8 = 3;
+const ROUNDS: u8 = 2;
 /// Samples of each half of the profile in one round.
 const BALANCE_POINTS: u8 = 3;
 /// Largest factor by which one round reduces an acceleration.
@@ -56,6 +56,10 @@ enum Stage {
     Survey {
         point: u8,
         fastest: Vector4<f32>,
+    },
+    /// Torques at rest, at one of three places.
+    Rest {
+        place: u8,
     },
     /// Profile from the bounds, after this many corrections.
     Compose {
@@ -87,8 +91,15 @@ enum Stage {
         /// Time of the sample, s.
         t: f32,
         time_scale: f32,
-        /// Time and acceleration of the sample before.
-        before: Option<(f32, Vector4<f32>)>,
+        /// The sample before.
+        before: Option<Before>,
+    },
+    /// Its motion is known.
+    Load {
+        t: f32,
+        time_scale: f32,
+        before: Option<Before>,
+        reference: Reference,
     },
     /// All samples have been checked.
     Finish {
@@ -121,11 +132,11 @@ impl Planner {
     /// Number of calls of [`Planner::work`] after which a plan is complete or refused.
     pub const MAX_STEPS: u32 = {
         let locate = 1;
-        let survey = SURVEY_POINTS as u32 + 1;
+        let survey = SURVEY_POINTS as u32 + 1 + 3;
         let compose = ROUNDS as u32 + 1;
         let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
-        // Its ends, and the borders of three profiles of seven segments.
-        let verify = LINE_STEPS as u32 + 2 + 3 * 8;
+        // Its ends, and the borders of the travel's seven segments; motion and torques.
+        let verify = 2 * (LINE_STEPS as u32 + 2 + 8);
         let finish = 1;
         locate + survey + compose + balance + jump::STEPS + verify + finish
     };
@@ -195,6 +206,7 @@ impl Planner {
             Stage::Idle => return None,
             Stage::Locate { end } => self.locate(budget.arm, end),
             Stage::Survey { point, fastest } => self.survey(budget, point, fastest),
+            Stage::Rest { place } => self.rest(budget, place),
             Stage::Raise { down } => {
                 self.raise(budget, down);
                 Ok(())
@@ -226,6 +238,15 @@ impl Planner {
                 time_scale,
                 before,
             } => self.verify(budget, t, time_scale, before),
+            Stage::Load {
+                t,
+                time_scale,
+                before,
+                reference,
+            } => {
+                self.load(budget, (t, time_scale, before), &reference);
+                Ok(())
+            }
             Stage::Finish { time_scale } => self.finish(budget, time_scale),
         };
         if step.is_err() {
@@ -243,6 +264,7 @@ impl Planner {
     }
 
     /// The path to the target.
+    #[inline(never)]
     fn locate(
         &mut self,
         arm: &ArmModel,
@@ -271,6 +293,7 @@ impl Planner {
     }
 
     /// Profile from the bounds.
+    #[inline(never)]
     fn compose(&mut self, round: u8) {
         let travels = self.bounds.speed > 0.0;
         if travels {

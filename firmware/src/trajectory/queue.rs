@@ -175,9 +175,8 @@ impl MoveQueue {
                 qd: setpoint.ahead.qd,
                 qdd: setpoint.ahead.qdd,
             };
-            let room = budget.braking_room(&then, self.clock.time_scale());
-            let limits = &budget.arm.limits;
-            self.clock.brake(&setpoint.reference, room, limits, period);
+            let braking = budget.braking(&then, self.clock.time_scale());
+            self.clock.brake(braking, period);
             if ended || self.clock.is_stopped() {
                 *setpoint = Setpoint::rest(q);
                 return Progress::Arrived;

@@ -7,13 +7,20 @@ use super::Reference;
 use super::path::PathPoint;
 use super::profile::{Bounds, Sample};
 use crate::mechanics::arm::{ArmModel, Axis};
-use crate::mechanics::body::Body;
+use crate::mechanics::body::{Body, Torques};
 use crate::mechanics::kinematics::Trig;
-use crate::mechanics::math::{cbrt, clamp, sqrt};
+use crate::mechanics::math::{cbrt, clamp, least, sqrt};
 
 /// Share of the torque that a plan may use. The rest is for feedback control: payload and friction are never known
 /// exactly, and a saturated axis leaves the path.
-pub const TORQUE_SHARE: f32 = 0.93;
+pub const TORQUE_SHARE: f32 = 0.945;
+/// Share of the torque's rate of change that a plan may use. The rest is for what lies between two knots.
+const RATE_SHARE: f32 = 0.95;
+
+/// The same for the mean over a step of the last pass.
+const VERIFIED_RATE: f32 = 0.955;
+/// Share of the torque's rate of change that a stop may use: the move's own change keeps the rest.
+pub(super) const STOP_SHARE: f32 = 0.5;
 
 /// The limits of one arm with one payload, as the planner uses them.
 #[derive(Clone, Copy, Debug)]
@@ -24,62 +31,116 @@ pub struct TorqueBudget<'a> {
     pub body: &'a Body,
 }
 
+/// What a motion along a path needs: torque in proportion to the acceleration along it, and torque for everything else.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Need {
+    /// For each unit of acceleration along the path.
+    push: Torques,
+    /// Without acceleration along the path.
+    rest: Torques,
+}
+
+/// How fast a trajectory may be stopped on its path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Braking {
+    /// Greatest change of the time scale, 1/s.
+    pub slope: f32,
+    /// Greatest change of the slope, 1/s²; infinite at rest.
+    pub bend: f32,
+}
+
 impl TorqueBudget<'_> {
+    /// What a motion along a path at the speed `v` along it, 1/s, needs.
+    pub fn need(&self, here: &PathPoint, v: f32) -> Need {
+        let rest = Reference {
+            q: here.q,
+            qd: here.dq * v,
+            qdd: here.ddq * (v * v),
+        };
+        self.split(&rest, &here.dq)
+    }
+
+    /// The acceleration along the path, 1/s², and the jerk, 1/s³, that the torques and their rates of change allow an arm at rest.
+    pub fn from_rest(&self, here: &PathPoint) -> (f32, f32) {
+        let need = self.need(here, 0.0);
+        (self.room(&need, 0.0), self.quickest(&need))
+    }
+
     /// By what factor the path acceleration of `along` could grow before the first torque
     /// reaches its share; huge where the sample needs hardly any.
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
-        let push = here.dq * along.a;
-        let rest = Reference {
-            q: here.q,
-            qd: here.dq * along.v,
-            qdd: here.ddq * (along.v * along.v),
-        };
+        let mut need = self.need(here, along.v);
+        need.push *= along.a;
         // Less than a hundredth of the limit: another sample decides.
-        self.room(&rest, &push, 0.01)
+        self.room(&need, 0.01)
     }
 
-    /// How fast the clock that runs through a trajectory at `time_scale` may be braked, 1/s, before the first torque reaches
+    /// How fast the motors can change the acceleration along the path, 1/s³; infinite where nothing moves.
+    fn quickest(&self, need: &Need) -> f32 {
+        let each = need.push.iter().zip(self.body.torque_rate.iter());
+        each.fold(f32::INFINITY, |quickest, (push, rate)| {
+            slower(quickest, RATE_SHARE * rate, *push)
+        })
+    }
+
+    /// How fast the clock that runs through a trajectory at `time_scale` may be braked before the first torque reaches
     /// its share. `reference` is the trajectory's own. With a load on the lift the two directions differ: its
     /// weight brakes a rise, and takes most of the force on the way down.
-    pub fn braking_room(&self, reference: &Reference, time_scale: f32) -> f32 {
+    pub fn braking(&self, reference: &Reference, time_scale: f32) -> Braking {
         let rest = Reference {
             q: reference.q,
             qd: reference.qd * time_scale,
             qdd: reference.qdd * (time_scale * time_scale),
         };
-        self.room(&rest, &-reference.qd, 0.0).max(0.0)
+        let need = self.split(&rest, &-reference.qd);
+        let mut braking = Braking {
+            slope: self.room(&need, 0.0).max(0.0),
+            bend: STOP_SHARE * self.quickest(&need),
+        };
+        if self.arm.limits.caps_acceleration() {
+            self.cap_braking(&rest, &reference.qd, &mut braking);
+        }
+        braking
     }
 
-    /// By what factor the accelerations `push` could grow before they and `rest` together need more than their share of
-    /// the torque of a joint or motor; those that need no more than a part `least` of it for `push` are left out.
+    /// The torques for the motion `rest`, and for the accelerations `push` apart from it.
     // Out of line, for the size of two copies.
     #[inline(never)]
-    fn room(&self, rest: &Reference, push: &Vector4<f32>, least: f32) -> f32 {
+    fn split(&self, rest: &Reference, push: &Vector4<f32>) -> Need {
+        let trig = Trig::relative(&rest.q);
+        Need {
+            push: self.torques(&self.body.inertial(&trig, push)),
+            rest: self.load(&trig, rest),
+        }
+    }
+
+    /// Torques of a motion.
+    #[inline(never)]
+    fn load(&self, trig: &Trig, Reference { qd, qdd, .. }: &Reference) -> Torques {
         let Self { arm, body } = self;
-        let Reference { q, qd, qdd } = rest;
-        let trig = Trig::in_line(q);
-        let push = body.inertial(&trig, push);
-        let rest = body.inertial(&trig, qdd)
-            + body.lagrange.bias(&trig, qd)
+        let torque = body.inertial(trig, qdd)
+            + body.lagrange.bias(trig, qd)
             + body.lagrange.gravity()
             + arm.drive.viscous.component_mul(qd)
             + body.drive.coulomb_friction(qd);
-        let (joint, motor) = self.torque_limits();
+        self.torques(&torque)
+    }
+
+    /// By what factor `push` could grow before it and `rest` together need more than their share of
+    /// a torque; those that need no more than a part `least` of it for `push` are left out.
+    fn room(&self, need: &Need, least: f32) -> f32 {
+        let limits = self.torque_limits();
         let mut room = f32::MAX;
-        let mut narrow = |push: f32, rest: f32, limit: f32| {
-            let (need, rest) = if push < 0.0 {
+        for ((push, rest), limit) in need.push.iter().zip(need.rest.iter()).zip(limits.iter()) {
+            let (need, rest) = if *push < 0.0 {
                 (-push, -rest)
             } else {
-                (push, rest)
+                (*push, *rest)
             };
             if need > least * limit {
                 room = room.min((limit - rest) / need);
             }
-        };
-        for ((push, rest), limit) in push.iter().zip(rest.iter()).zip(joint.iter()) {
-            narrow(*push, *rest, *limit);
         }
-        narrow(self.wrist_motor(&push), self.wrist_motor(&rest), motor);
         room
     }
 
@@ -89,7 +150,7 @@ impl TorqueBudget<'_> {
     /// [`RefusalReason::TorqueTooSmall`] with the axis and the torque, which no time scale reduces.
     pub fn check_creep(&self) -> Result<(), Refusal> {
         let torque = self.body.lagrange.gravity().abs() + self.arm.drive.coulomb;
-        let (joint, motor) = self.torque_limits();
+        let limits = self.torque_limits();
         let refuse = |axis: Axis, value: f32, limit: f32| {
             Err(Refusal {
                 reason: RefusalReason::TorqueTooSmall,
@@ -98,7 +159,7 @@ impl TorqueBudget<'_> {
                 limit,
             })
         };
-        for ((axis, value), limit) in Axis::ALL.into_iter().zip(torque.iter()).zip(joint.iter()) {
+        for ((axis, value), limit) in Axis::ALL.into_iter().zip(torque.iter()).zip(limits.iter()) {
             if value >= limit {
                 return refuse(axis, *value, *limit);
             }
@@ -106,74 +167,66 @@ impl TorqueBudget<'_> {
         let lift = Vector4::new(0.0, 0.0, torque.z, 0.0);
         let wrist = Vector4::new(0.0, 0.0, 0.0, torque.w);
         let value = self.wrist_motor(&lift).abs() + self.wrist_motor(&wrist).abs();
-        if value >= motor {
-            return refuse(Axis::Wrist, value, motor);
+        if value >= limits.a {
+            return refuse(Axis::Wrist, value, limits.a);
         }
         Ok(())
     }
 
-    /// The largest time scale, at most 1, at which `reference` keeps the torque limits of joints and
-    /// motors, of an arm that [can creep](Self::check_creep).
-    pub fn torque_scale(&self, reference: &Reference) -> f32 {
-        let Self { arm, body } = self;
-        let trig = Trig::in_line(&reference.q);
-        let (qd, qdd) = (&reference.qd, &reference.qdd);
-        // tau(x) = a x² + b x + c. Coulomb friction does not depend on x.
-        let a = body.inertial(&trig, qdd) + body.lagrange.bias(&trig, qd);
-        let b = arm.drive.viscous.component_mul(qd);
-        let c = body.lagrange.gravity() + body.drive.coulomb_friction(qd);
-        let full = a + b + c;
-        let (joint, motor) = self.torque_limits();
+    /// The largest time scale, at most 1, at which `reference` keeps the torque limits of joints and motors, of an arm that
+    /// [can creep](Self::check_creep); and its torques without Coulomb friction, which sets in at once.
+    #[inline(never)]
+    pub fn torque_scale(&self, reference: &Reference) -> (f32, Torques) {
+        let full = self.load(&Trig::relative(&reference.q), reference);
+        let dry = self.body.drive.coulomb_friction(&reference.qd);
+        let smooth = full - self.torques(&dry);
+        let limits = self.torque_limits();
         // Nearly every sample keeps its limits as it is: then there is nothing to solve.
-        if within(&full, &joint) && self.wrist_motor(&full).abs() <= motor {
-            return 1.0;
-        }
-        let wrist = |torque: &Vector4<f32>| self.wrist_motor(torque);
-        scale_within(a.x, b.x, c.x, joint.x)
-            .min(scale_within(a.y, b.y, c.y, joint.y))
-            .min(scale_within(a.z, b.z, c.z, joint.z))
-            .min(scale_within(a.w, b.w, c.w, joint.w))
-            .min(scale_within(wrist(&a), wrist(&b), wrist(&c), motor))
+        let scale = if within(&full, &limits) {
+            1.0
+        } else {
+            // tau(x) = a x² + b x + c. Coulomb friction does not depend on x.
+            let viscous = self.arm.drive.viscous.component_mul(&reference.qd);
+            let b = self.torques(&viscous);
+            let c = self.torques(&(self.body.lagrange.gravity() + dry));
+            let a = full - b - c;
+            let mut scale = 1.0f32;
+            for (((a, b), c), limit) in a.iter().zip(b.iter()).zip(c.iter()).zip(limits.iter()) {
+                scale = least(scale, scale_within(*a, *b, *c, *limit));
+            }
+            scale
+        };
+        (scale, smooth)
     }
 
-    /// Torques that a plan or a stop may use: of the joints, as they and the motors that turn one joint each allow, and of the motor of the
-    /// wrist, which carries part of the lift's force, too.
-    fn torque_limits(&self) -> (Vector4<f32>, f32) {
-        let motor = self.arm.drive.motor_torque_limit.w;
-        (self.body.effort_limit * TORQUE_SHARE, motor * TORQUE_SHARE)
+    /// The largest time scale, at most 1, at which torques change no faster than by `change` within `time` s.
+    pub fn rate_scale(&self, change: &Torques, time: f32) -> f32 {
+        let rates = self.body.torque_rate * (VERIFIED_RATE * time);
+        let ratio = ratio(rates.as_slice(), change.as_slice());
+        // All but a small part of the change is inertial, and goes with the cube of the time scale.
+        if ratio < 1.0 { cbrt(ratio) } else { 1.0 }
+    }
+
+    /// Torques that a plan or a stop may use.
+    fn torque_limits(&self) -> Torques {
+        self.body.torque_limit * TORQUE_SHARE
+    }
+
+    fn torques(&self, joint: &Vector4<f32>) -> Torques {
+        Torques::new(joint.x, joint.y, joint.z, joint.w, self.wrist_motor(joint))
     }
 
     fn wrist_motor(&self, torque: &Vector4<f32>) -> f32 {
         self.body.drive.motor_torque(torque).w
     }
 
-    /// The largest time scale, at most 1, at which the motor of the lift, which also turns with the wrist, keeps its speed
-    /// limit.
-    pub fn lift_motor_scale(&self, qd: &Vector4<f32>) -> f32 {
-        let speed = self.body.drive.motor_speed(qd).z.abs();
-        let limit = self.arm.drive.motor_speed_limit.z;
-        if speed > limit { limit / speed } else { 1.0 }
-    }
-
-    /// The largest time scale, at most 1, at which `reference` and the joint jerks `qddd` use no more than `share` of the limits
-    /// of speed, acceleration and jerk.
-    pub fn derivative_scale(&self, reference: &Reference, qddd: &Vector4<f32>, share: f32) -> f32 {
-        let limits = &self.arm.limits;
-        let speed = ratio(&(limits.velocity * share), &reference.qd);
-        let motor = ratio(
-            &(self.arm.drive.motor_speed_limit * share),
-            &self.body.drive.motor_speed(&reference.qd),
-        );
-        let acceleration = ratio(&(limits.acceleration * share), &reference.qdd);
-        let jerk = ratio(&(limits.jerk * share), qddd);
-        let mut scale = speed.min(motor);
-        if acceleration < 1.0 {
-            scale = scale.min(sqrt(acceleration));
-        }
-        if jerk < 1.0 {
-            scale = scale.min(cbrt(jerk));
-        }
-        scale
+    /// The largest time scale, at most 1, at which the joint speeds `qd` use no more than `share` of the limits of joints and
+    /// motors. Lift and wrist share one.
+    pub fn speed_scale(&self, qd: &Vector4<f32>, share: f32) -> f32 {
+        let joint = ratio((self.arm.limits.velocity * share).as_slice(), qd.as_slice());
+        let motor = self.arm.drive.motor_speed_limit * share;
+        let speed = self.body.drive.motor_speed(qd);
+        least(joint, ratio(motor.as_slice(), speed.as_slice()))
     }
 
     /// Largest joint speeds: the joint's own limit or the motor's, whichever is lower.
@@ -193,11 +246,15 @@ impl TorqueBudget<'_> {
         let limits = &self.arm.limits;
         let mass = self.body.nominal_inertia.z;
         let weight = -self.body.lagrange.gravity().z;
-        let cap = limits.acceleration.z;
         let speed = self.speed().z;
+        let force = self.torque_limits().z;
+        let cap = limits.acceleration.z.min((force + weight) / mass);
         let peak = sqrt(cap * height).min(speed);
         let friction = self.arm.drive.coulomb.z + self.arm.drive.viscous.z * peak;
-        let force = self.torque().z;
+        // Viscous friction grows with the speed while the acceleration grows.
+        let viscous = self.arm.drive.viscous.z * cap;
+        let rate = RATE_SHARE * self.body.torque_rate.z;
+        let jerk = limits.jerk.z.min((rate - viscous).max(0.1 * rate) / mass);
         // Strokes that the drive cannot hold have been refused: this keeps the bound positive for one close to the
         // limit.
         let within = |force: f32| clamp(force / mass, 0.01 * cap, cap);
@@ -205,23 +262,31 @@ impl TorqueBudget<'_> {
             speed,
             accelerate: within(force - weight - friction),
             brake: within(force + weight),
-            jerk: limits.jerk.z,
+            jerk,
         };
         let down = Bounds {
             speed,
             accelerate: within(force + weight - friction),
             brake: within(force - weight),
-            jerk: limits.jerk.z,
+            jerk,
         };
         (up, down)
     }
+}
 
-    fn torque(&self) -> Vector4<f32> {
-        self.arm.limits.effort * TORQUE_SHARE
+/// The lower one of `fastest` and the acceleration for which `push` takes one second to be built up at `rate`.
+// Out of line, for the size of one copy.
+#[inline(never)]
+pub(super) fn slower(fastest: f32, rate: f32, push: f32) -> f32 {
+    let push = push.abs();
+    if push * fastest > rate {
+        rate / push
+    } else {
+        fastest
     }
 }
 
-fn within(value: &Vector4<f32>, limit: &Vector4<f32>) -> bool {
+fn within(value: &Torques, limit: &Torques) -> bool {
     value
         .iter()
         .zip(limit.iter())
@@ -229,9 +294,11 @@ fn within(value: &Vector4<f32>, limit: &Vector4<f32>) -> bool {
 }
 
 /// Smallest ratio of limit to value where a value exceeds its limit; otherwise at least 1.
-fn ratio(limit: &Vector4<f32>, value: &Vector4<f32>) -> f32 {
+// Out of line, for the size of one copy.
+#[inline(never)]
+pub(super) fn ratio(limit: &[f32], value: &[f32]) -> f32 {
     let mut least = 1.0f32;
-    for (limit, value) in limit.iter().zip(value.iter()) {
+    for (limit, value) in limit.iter().zip(value) {
         let value = value.abs();
         if value * least > *limit {
             least = limit / value;
@@ -241,6 +308,7 @@ fn ratio(limit: &Vector4<f32>, value: &Vector4<f32>) -> f32 {
 }
 
 /// Largest `x`, at most 1, with `a x² + b x + c` within the limit.
+#[inline(never)]
 fn scale_within(a: f32, b: f32, c: f32, limit: f32) -> f32 {
     let full = a + b + c;
     if full > limit {
@@ -252,10 +320,12 @@ fn scale_within(a: f32, b: f32, c: f32, limit: f32) -> f32 {
     }
 }
 
-/// The positive root of `a x² + b x = room`, for a + b > room > 0.
-#[cold]
+/// The positive root of `a x² + b x = room`, for a + b > room > 0, by Newton's method from 1: the last pass meets samples that are
+/// a few per cent beyond a limit, for which two steps leave less than a thousandth.
 fn largest_scale(a: f32, b: f32, room: f32) -> f32 {
-    // In the form that does not cancel. For a < 0, b > room - a makes the discriminant positive.
-    let root = sqrt((b * b + 4.0 * a * room).max(0.0));
-    (2.0 * room / (b + root)).min(1.0)
+    let mut x = 1.0f32;
+    for _ in 0..2 {
+        x = (a * x * x + room) / (2.0 * a * x + b);
+    }
+    x
 }

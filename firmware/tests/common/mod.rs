@@ -48,9 +48,9 @@ pub(crate) fn speed() -> impl Strategy<Value = Vector4<f32>> {
     within(IRB_930.limits.velocity)
 }
 
-/// Joint accelerations up to the limits of the IRB 930.
+/// Joint accelerations up to those that the torques of the IRB 930 give it.
 pub(crate) fn acceleration() -> impl Strategy<Value = Vector4<f32>> {
-    within(IRB_930.limits.acceleration)
+    within(Vector4::new(60.0, 120.0, 60.0, 600.0))
 }
 
 fn offset() -> impl Strategy<Value = Vector3<f32>> {

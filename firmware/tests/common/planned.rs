@@ -1,7 +1,7 @@
 //! Plans, and walks along them against the limits of the robot, judged by the recursive Newton-Euler dynamics, which the planner
 //! does not use.
 
-use firmware::mechanics::arm::{ArmModel, Payload};
+use firmware::mechanics::arm::{ArmModel, IRB_930, Payload};
 use firmware::mechanics::body::Body;
 use firmware::mechanics::dynamics::newton_euler;
 use firmware::trajectory::Trajectory;
@@ -61,12 +61,16 @@ pub(crate) fn check(
     let duration = trajectory.duration();
     let steps = 800;
     let slack = 1.0 + 1e-3;
-    let mut previous: Option<(Vector4<f32>, Vector4<f32>)> = None;
+    let mut previous: Option<(Vector4<f32>, Vector4<f32>, Vector4<f32>)> = None;
     for i in 0..=steps {
         let t = duration * i as f32 / steps as f32;
         let r = trajectory
             .at(arm, t)
             .expect("a planned path stays in reach");
+        // Dry friction is there at once: the rate of a torque is that of the rest.
+        let smooth = newton_euler::inverse(arm, payload, &r.q, &r.qd, &r.qdd)
+            + body.drive.rotor_inertia() * r.qdd
+            + arm.drive.viscous.component_mul(&r.qd);
         let torque = newton_euler::inverse(arm, payload, &r.q, &r.qd, &r.qdd)
             + body.drive.rotor_inertia() * r.qdd
             + body.drive.friction(&r.qd);
@@ -98,7 +102,7 @@ pub(crate) fn check(
             );
         }
         // Positions, speeds and accelerations are consistent: no jump between two samples.
-        if let Some((before, acceleration)) = previous {
+        if let Some((before, acceleration, earlier)) = previous {
             let h = duration / steps as f32;
             for axis in 0..4 {
                 let bound = arm.limits.velocity[axis] * h * slack + 1e-5;
@@ -106,14 +110,29 @@ pub(crate) fn check(
                 // Jerk by differences: along a line the reference omits a part of it.
                 // f32 accelerations of up to 600 rad/s^2, each off by some 20 u.
                 let jerk = (r.qdd[axis] - acceleration[axis]).abs() / h;
-                let noise = 20.0 * f32::EPSILON * arm.limits.acceleration[axis] / h;
+                let noise = 20.0 * f32::EPSILON * r.qdd.amax() / h;
                 prop_assert!(
                     jerk <= arm.limits.jerk[axis] * slack + noise,
                     "jerk {axis} {jerk}"
                 );
+                let rates = |torque: &Vector4<f32>, limit: &Vector4<f32>| {
+                    torque.abs()[axis] * arm.limits.effort_rise_time[axis] / (limit[axis] * h)
+                };
+                let change = smooth - earlier;
+                // Sums of several terms of up to twice the limit, each off by 4 u.
+                let noise = 64.0 * f32::EPSILON * arm.limits.effort_rise_time[axis] / h;
+                let joint = change.abs()[axis] / (body.torque_rate[axis] * h);
+                let motor = rates(
+                    &body.drive.motor_torque(&change),
+                    &arm.drive.motor_torque_limit,
+                );
+                prop_assert!(
+                    joint.max(motor) <= 1.0 + noise,
+                    "torque rate {axis} {joint} {motor} at {t} of {duration}"
+                );
             }
         }
-        previous = Some((r.q, r.qdd));
+        previous = Some((r.q, r.qdd, smooth));
     }
     let end = trajectory.at(arm, duration * 1.01).expect("in reach");
     prop_assert!((end.q - trajectory.end).amax() < 1e-5);
@@ -124,4 +143,12 @@ pub(crate) fn check(
 pub(crate) fn joints() -> impl Strategy<Value = Vector4<f32>> {
     (-2.6f32..2.6, -2.5f32..2.5, 0.0f32..0.3, -6.9f32..6.9)
         .prop_map(|(a, b, c, d)| Vector4::new(a, b, c, d))
+}
+
+/// The arm as it is, and with limits of acceleration and jerk.
+pub(crate) fn robot() -> impl Strategy<Value = ArmModel> {
+    let mut capped = IRB_930;
+    capped.limits.acceleration = Vector4::new(60.0, 120.0, 60.0, 600.0);
+    capped.limits.jerk = Vector4::new(2_500.0, 7_500.0, 10_000.0, 40_000.0);
+    prop_oneof![Just(IRB_930), Just(capped)]
 }

@@ -9,6 +9,11 @@ fn four(values: [f64; 4]) -> Vector4<f32> {
     Vector4::from(values.map(|x| x as f32))
 }
 
+/// A limit that a robot need not have.
+fn cap(values: Option<[f64; 4]>) -> Vector4<f32> {
+    values.map_or_else(|| Vector4::repeat(JointLimits::NONE), four)
+}
+
 fn three(values: [f64; 3]) -> Vector3<f32> {
     Vector3::from(values.map(|x| x as f32))
 }
@@ -35,9 +40,10 @@ impl From<&model::RobotModel> for ArmModel {
                 lower: four(limits.lower),
                 upper: four(limits.upper),
                 velocity: four(limits.velocity),
-                acceleration: four(limits.acceleration),
-                jerk: four(limits.jerk),
+                acceleration: cap(limits.acceleration),
+                jerk: cap(limits.jerk),
                 effort: four(limits.effort),
+                effort_rise_time: four(limits.effort_rise_time),
                 effort_continuous: four(limits.effort_continuous),
             },
             drive: DriveTrain {

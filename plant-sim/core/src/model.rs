@@ -80,12 +80,14 @@ pub struct JointLimits {
     pub upper: [f64; 4],
     /// Largest speed.
     pub velocity: [f64; 4],
-    /// Largest acceleration.
-    pub acceleration: [f64; 4],
-    /// Largest jerk.
-    pub jerk: [f64; 4],
+    /// Largest acceleration, where the robot limits it.
+    pub acceleration: Option<[f64; 4]>,
+    /// Largest jerk, where the robot limits it.
+    pub jerk: Option<[f64; 4]>,
     /// Largest effort for a short time.
     pub effort: [f64; 4],
+    /// Time in which a motor takes up its largest effort from nothing, s.
+    pub effort_rise_time: [f64; 4],
     /// Continuous rating: largest root-mean-square effort.
     pub effort_continuous: [f64; 4],
 }

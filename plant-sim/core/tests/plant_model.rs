@@ -260,9 +260,14 @@ fn physics_that_no_robot_has_is_refused() {
             "drive.motor_max_speed_rad_s[0] is 6283; it must be a number > 0, at most 1600 rad/s",
         ),
         (
-            r#""acceleration_cap": [60.0"#,
-            r#""acceleration_cap": [1e7"#,
+            r#""effort_peak": [640.0"#,
+            r#""acceleration_cap": [1e7, 1, 1, 1], "effort_peak": [640.0"#,
             "joint_limits.acceleration_cap[0] is 10000000; it must be a number > 0, at most 100000 rad/s2",
+        ),
+        (
+            r#""effort_rise_time_s": [0.010"#,
+            r#""effort_rise_time_s": [10"#,
+            "joint_limits.effort_rise_time_s[0] is 10; it must be a number from 0.0001 to 1 s",
         ),
         (
             r#""rotor_inertia_motor_side": [0.000384"#,

@@ -60,6 +60,8 @@ fn toml(value: &Value) -> toml::Value {
 fn documents() -> [(Value, Value, Reader); 3] {
     let mut robot: Value =
         serde_json::from_str(include_str!("../../models/irb930-22-1.05.json")).unwrap();
+    robot["joint_limits"]["acceleration_cap"] = json!([60.0, 120.0, 60.0, 600.0]);
+    robot["joint_limits"]["jerk_cap"] = json!([2500.0, 7500.0, 10000.0, 40000.0]);
     robot["links"][1]["lc"] = json!(0.2);
     robot["links"][1]["com_dh_frame"] = json!([-0.29, 0.0, -0.0902]);
     let body = json!({ "mass": 2.0, "com_flange_frame": [0.0, 0.0, 0.05], "inertia_com_diag": [0.008, 0.008, 0.01] });

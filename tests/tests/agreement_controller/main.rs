@@ -136,9 +136,11 @@ fn built_in_arm_is_the_reference_arm() {
             lower: joint("/joint_limits/lower"),
             upper: joint("/joint_limits/upper"),
             velocity: joint("/joint_limits/velocity"),
-            acceleration: joint("/joint_limits/acceleration_cap"),
-            jerk: joint("/joint_limits/jerk_cap"),
+            // The table has estimates of both; torque and its rate are the limit.
+            acceleration: Vector4::repeat(JointLimits::NONE),
+            jerk: Vector4::repeat(JointLimits::NONE),
             effort: joint("/joint_limits/effort_peak"),
+            effort_rise_time: Vector4::repeat(0.010),
             effort_continuous: joint("/joint_limits/effort_continuous_rms"),
         },
         drive: DriveTrain {

@@ -158,6 +158,7 @@ impl JointLimits {
         Rule::Positive.check_joint("limits.acceleration", &self.acceleration)?;
         Rule::Positive.check_joint("limits.jerk", &self.jerk)?;
         Rule::Positive.check_joint("limits.effort", &self.effort)?;
+        Rule::Positive.check_joint("limits.effort_rise_time", &self.effort_rise_time)?;
         Rule::Positive.check_joint("limits.effort_continuous", &self.effort_continuous)
     }
 }

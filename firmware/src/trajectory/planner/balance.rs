@@ -9,6 +9,7 @@ use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Planner {
     /// One sample of one half; at the end of a round, new accelerations.
+    #[inline(never)]
     pub(super) fn balance(
         &mut self,
         budget: &TorqueBudget<'_>,

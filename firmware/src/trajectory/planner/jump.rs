@@ -11,7 +11,7 @@
 
 use super::{NO_TRAVEL, Planner, Stage};
 use crate::mechanics::arm::ArmModel;
-use crate::mechanics::math::{sin_cos, sqrt};
+use crate::mechanics::math::{least, sin_cos, sqrt};
 use crate::trajectory::Lift;
 use crate::trajectory::path::Path;
 use crate::trajectory::profile::{Bounds, SCurve};
@@ -96,12 +96,11 @@ pub(super) struct Chamfer {
     pace: f32,
     /// Time between two knots, s.
     step: f32,
-    /// How much higher than the chamfer a knot has to be, so that the stroke is not lower between two, m.
-    margin: f32,
 }
 
 impl Planner {
     /// How much higher the top has to be for the stroke at one end to pass the height of the gate without braking.
+    #[inline(never)]
     pub(super) fn raise(&mut self, budget: &TorqueBudget<'_>, down: bool) {
         self.stage = Stage::Stroke { down: false };
         let Some(jump) = &mut self.jump else { return };
@@ -119,6 +118,7 @@ impl Planner {
     }
 
     /// The profile of one vertical stroke.
+    #[inline(never)]
     pub(super) fn stroke(&mut self, budget: &TorqueBudget<'_>, down: bool) {
         let (Some(jump), Path::Joint { start, .. }) = (&self.jump, &self.draft.path) else {
             return;
@@ -146,6 +146,7 @@ impl Planner {
 
     /// How long the travel has to wait for the stroke at one end: for the rise after the start, or, seen backwards, for the
     /// descent before the end.
+    #[inline(never)]
     pub(super) fn lead(
         &mut self,
         arm: &ArmModel,
@@ -171,38 +172,40 @@ impl Planner {
             lead = stroke.time_at(free_from);
             knot = KNOTS;
         } else {
-            let Some(Chamfer { pace, step, margin }) = chamfer else {
+            let Some(Chamfer { pace, step }) = chamfer else {
                 let pace = pace(arm, &self.draft.path, free_from, down);
                 let until = travel.time_at((free_from / pace).min(1.0));
                 let step = until / f32::from(KNOTS);
-                let bend = stroke.peaks().0 + pace * travel.peaks().1;
                 self.stage = Stage::Lead {
                     down,
                     knot,
-                    chamfer: Some(Chamfer {
-                        pace,
-                        step,
-                        margin: 0.125 * bend * (step * step),
-                    }),
+                    chamfer: Some(Chamfer { pace, step }),
                     lead,
                 };
                 return;
             };
-            let mut s = travel.at(f32::from(knot + 1) * step).s;
             for _ in 0..KNOTS_A_STEP {
                 knot += 1;
                 let t = f32::from(knot) * step;
-                let next = travel.at(t + step).s;
-                let own = (pace * s).min(free_from);
+                let across = travel.at(t);
+                let own = least(pace * across.s, free_from);
                 // Beyond its middle the other end is nearer, and may be higher.
-                let other = if next > OTHER_END {
-                    free_from - beyond + beyond.min(0.5 * pace)
+                let soon = across.s + step * (across.v + step * across.a.abs());
+                let other = if soon > OTHER_END {
+                    free_from - beyond + least(beyond, 0.5 * pace)
                 } else {
                     0.0
                 };
-                s = next;
-                let needed = (own.max(other) + margin).min(stroke.distance());
-                if stroke.at(lead + t).s < needed {
+                let here = stroke.at(lead + t);
+                // Between two knots the height above the chamfer is a cubic, and a cubic does not leave the hull of its control
+                // points, of which two are a third of a step away from the knots.
+                let slope = if own < free_from {
+                    (here.v - pace * across.v).abs()
+                } else {
+                    0.0
+                };
+                let needed = least(own.max(other) + slope * step / 3.0, free_from);
+                if here.s < needed {
                     lead = stroke.time_at(needed) - t;
                 }
             }
@@ -229,6 +232,7 @@ impl Planner {
     }
 
     /// Strokes and travel in time; whether another height is to be tried.
+    #[inline(never)]
     pub(super) fn overlay(&mut self) {
         let (Some(jump), Some(lift)) = (&mut self.jump, &mut self.draft.lift) else {
             return;

@@ -3,16 +3,16 @@
 use nalgebra::Vector4;
 use protocol::messages::Refusal;
 
-use super::{Planner, SURVEY_POINTS, Stage, fill};
-use crate::mechanics::math::clamp;
-use crate::trajectory::path::{Path, PathPoint, check_limits};
-use crate::trajectory::profile::Sample;
+use super::{Planner, ROUNDS, SURVEY_POINTS, Stage, fill};
+use crate::mechanics::math::{clamp, least};
+use crate::trajectory::path::{Path, check_limits};
+use crate::trajectory::profile::Bounds;
 use crate::trajectory::request::from_ik;
 use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Planner {
-    /// Reach, limits and the largest joint travel per unit of path; at the ends also the accelerations from
-    /// rest that torque allows, as initial values of the rounds.
+    /// Reach, limits and the largest joint travel per unit of path.
+    #[inline(never)]
     pub(super) fn survey(
         &mut self,
         budget: &TorqueBudget<'_>,
@@ -36,11 +36,9 @@ impl Planner {
         // Until the plan is complete, this is where it starts.
         let from = &self.draft.end;
         check_limits(budget.arm, &here.q, from).map_err(from_ik)?;
-        let limits = &budget.arm.limits;
         let fastest = fastest.sup(&here.dq.abs());
         if point == 0 {
             budget.check_creep()?;
-            self.bounds.accelerate = self.acceleration_from_rest(budget, &here);
         }
         if point < points {
             self.stage = Stage::Survey {
@@ -49,28 +47,42 @@ impl Planner {
             };
             return Ok(());
         }
-        self.bounds.brake = self.acceleration_from_rest(budget, &here);
-        self.bounds.jerk = fill(&limits.jerk, &fastest);
-        self.bounds.speed = fill(&budget.speed(), &fastest);
+        // Of a robot that has such limits.
+        let limits = &budget.arm.limits;
+        let ceiling = fill(&limits.acceleration, &fastest);
+        self.bounds = Bounds {
+            speed: fill(&budget.speed(), &fastest),
+            accelerate: ceiling,
+            brake: ceiling,
+            jerk: fill(&limits.jerk, &fastest),
+        };
         if self.bounds.speed == f32::MAX {
             // Nothing moves along the path: at most the lift of a jump does.
             self.bounds.speed = 0.0;
+            self.stage = Stage::Compose { round: ROUNDS };
+        } else {
+            self.stage = Stage::Rest { place: 0 };
         }
-        self.stage = Stage::Compose { round: 0 };
         Ok(())
     }
 
-    /// The path acceleration at which a joint at rest reaches its limit of torque or acceleration.
-    pub(super) fn acceleration_from_rest(
-        &self,
-        budget: &TorqueBudget<'_>,
-        here: &PathPoint,
-    ) -> f32 {
-        let a = fill(&budget.arm.limits.acceleration, &here.dq);
-        let along = Sample {
-            a,
-            ..Sample::default()
-        };
-        a * budget.acceleration_room(here, &along).min(1.0)
+    /// What the torques and their rates allow an arm at rest at the beginning, in the middle and at the end of the path: the jerk,
+    /// and the accelerations for the first round.
+    #[inline(never)]
+    pub(super) fn rest(&mut self, budget: &TorqueBudget<'_>, place: u8) -> Result<(), Refusal> {
+        let here = self.point(budget.arm, 0.5 * f32::from(place))?;
+        let (acceleration, jerk) = budget.from_rest(&here);
+        let bounds = &mut self.bounds;
+        bounds.jerk = least(bounds.jerk, jerk);
+        self.stage = Stage::Rest { place: place + 1 };
+        match place {
+            0 => bounds.accelerate = least(bounds.accelerate, acceleration),
+            1 => {}
+            _ => {
+                bounds.brake = least(bounds.brake, acceleration);
+                self.stage = Stage::Compose { round: 0 };
+            }
+        }
+        Ok(())
     }
 }

@@ -4,54 +4,100 @@ use nalgebra::Vector4;
 use protocol::messages::Refusal;
 
 use super::{Planner, Stage};
+use crate::mechanics::body::Torques;
 use crate::mechanics::math::least;
-use crate::trajectory::Trajectory;
 use crate::trajectory::path::Path;
 use crate::trajectory::request::from_path;
 use crate::trajectory::torque_budget::TorqueBudget;
+use crate::trajectory::{Reference, Trajectory};
 
-/// Most steps of the last pass between segment borders; more along a line, where the joints have extrema of their own.
-const JOINT_STEPS: u8 = 20;
-pub(super) const LINE_STEPS: u8 = 40;
+/// Most steps of the last pass between the borders of the travel's segments; more along a line, where the joints have extrema of
+/// their own.
+const JOINT_STEPS: u8 = 16;
+pub(super) const LINE_STEPS: u8 = 24;
 /// Share of the limits of speed, acceleration and jerk that the samples of a line may use.
 const LINE_SHARE: f32 = 0.9;
 
+/// The same of those of acceleration and jerk, of a robot that has them.
+const CAP_SHARE: f32 = 0.95;
+
+fn share(draft: &Trajectory) -> f32 {
+    match draft.path {
+        Path::Joint { .. } => 1.0,
+        Path::Line { .. } => LINE_SHARE,
+    }
+}
+
+/// A sample of the last pass, for the one after it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Before {
+    /// Its time, s.
+    t: f32,
+    /// Torques without Coulomb friction.
+    torque: Torques,
+    /// Joint accelerations.
+    qdd: Vector4<f32>,
+}
+
 impl Planner {
     /// One sample of the whole move.
+    #[inline(never)]
     pub(super) fn verify(
         &mut self,
         budget: &TorqueBudget<'_>,
         t: f32,
         time_scale: f32,
-        before: Option<(f32, Vector4<f32>)>,
+        before: Option<Before>,
     ) -> Result<(), Refusal> {
         let reference = self.draft.at(budget.arm, t).map_err(from_path)?;
-        let mut time_scale = least(time_scale, budget.torque_scale(&reference));
-        if matches!(self.draft.path, Path::Line { .. }) {
-            let jerk = before.map_or_else(Vector4::zeros, |(earlier, qdd)| {
-                (reference.qdd - qdd) / (t - earlier)
-            });
-            time_scale = least(
-                time_scale,
-                budget.derivative_scale(&reference, &jerk, LINE_SHARE),
-            );
-        } else {
-            // The profile keeps each joint within its own limits; but lift and wrist share a motor.
-            time_scale = least(time_scale, budget.lift_motor_scale(&reference.qd));
+        let scale = budget.speed_scale(&reference.qd, share(&self.draft));
+        self.stage = Stage::Load {
+            t,
+            time_scale: least(time_scale, scale),
+            before,
+            reference,
+        };
+        Ok(())
+    }
+
+    /// Its torques.
+    #[inline(never)]
+    pub(super) fn load(
+        &mut self,
+        budget: &TorqueBudget<'_>,
+        (t, time_scale, before): (f32, f32, Option<Before>),
+        reference: &Reference,
+    ) {
+        let (torque_scale, torque) = budget.torque_scale(reference);
+        let mut time_scale = least(time_scale, torque_scale);
+        if let Some(before) = before {
+            let time = t - before.t;
+            let change = torque - before.torque;
+            time_scale = least(time_scale, budget.rate_scale(&change, time));
+            if budget.arm.limits.caps_acceleration() {
+                let jerk = (reference.qdd - before.qdd) / time;
+                let share = CAP_SHARE * share(&self.draft);
+                let scale = budget.cap_scale(&reference.qdd, &jerk, share);
+                time_scale = least(time_scale, scale);
+            }
         }
         self.stage = if t < self.draft.span {
             Stage::Verify {
                 t: self.next_sample(t),
                 time_scale,
-                before: Some((t, reference.qdd)),
+                before: Some(Before {
+                    t,
+                    torque,
+                    qdd: reference.qdd,
+                }),
             }
         } else {
             Stage::Finish { time_scale }
         };
-        Ok(())
     }
 
     /// Makes the draft the trajectory.
+    #[inline(never)]
     pub(super) fn finish(
         &mut self,
         budget: &TorqueBudget<'_>,
@@ -67,12 +113,12 @@ impl Planner {
 
     /// The sample of the last pass after `t`, s: inertia changes along the way, and torque often peaks at a segment
     /// border.
+    #[inline(never)]
     pub(super) fn next_sample(&self, t: f32) -> f32 {
         let Trajectory {
             path,
             start,
             profile,
-            lift,
             span,
             ..
         } = &self.draft;
@@ -85,14 +131,6 @@ impl Planner {
         let soon = t + 0.05 * step;
         let mut next = least(t + step, *span);
         next = least(next, start + profile.border_after(soon - start));
-        if let Some(lift) = lift {
-            let border = if soon < lift.down_start {
-                least(lift.up.border_after(soon), lift.down_start)
-            } else {
-                lift.down_start + lift.down.border_after(soon - lift.down_start)
-            };
-            next = least(next, border);
-        }
         next
     }
 }

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | no motor is asked for more than its peak torque | model |
 //! | an axis off its reference, too fast or out of its range is reported at the 4th sample in a row | default parameters: three samples, and one to answer |
-//! | torque is off 0.4 s after a fault was reported | twice the time in which the slowest axis stops from full speed at its acceleration and jerk, and the time of the brake |
+//! | torque is off 0.7 s after a fault was reported, with 22 kg | 1.25 times the time in which the slowest axis of the stretched arm stops from full speed with the torque that its weight leaves, and the time of the brake |
 //! | while torque is on after that, the tool travels no further than at its greatest speed for the time of such a stop | the same |
 //! | no kinetic energy beyond that of all axes at 1.1 times their speed limit | the monitor's speed limit |
 //! | once torque is off, no kinetic energy but from the weight of the lift | nothing else drives the arm |
@@ -32,6 +32,8 @@ pub const SAMPLES_TO_REPORT: u32 = 4;
 /// Samples from a report until the brake is told at the latest: the drives hold a command for 5 samples, and a stop that an axis does
 /// not follow is given up at the 4th sample.
 const SAMPLES_TO_BRAKE: f64 = 8.0;
+/// For a plan that uses less than all of the torque, and builds it up at half its rate.
+const STOP_MARGIN: f64 = 1.25;
 /// The brake closes within this, s.
 const BRAKE_S: f64 = 0.03;
 /// The controller waits this long for the brake, s.
@@ -145,10 +147,19 @@ impl Bounds {
     /// Longest time of a controlled stop, s.
     pub fn stop_s(&self) -> f64 {
         let limits = &self.model.limits;
+        let stretched = self.arm.at(&Vector4::zeros());
+        let inertia = self.arm.mass_matrix(&stretched) + self.drive.rotor_inertia();
+        let weight = self.arm.gravity(&stretched);
         let axis = |i: usize| {
-            limits.velocity[i] / limits.acceleration[i] + limits.acceleration[i] / limits.jerk[i]
+            let most = limits.effort[i];
+            let torque = (most - weight[i].abs()) / inertia[(i, i)];
+            let cap = limits.acceleration.map_or(f64::INFINITY, |cap| cap[i]);
+            let slowing = torque.min(cap);
+            let jerk = limits.jerk.map_or(f64::INFINITY, |cap| cap[i]);
+            let rise = limits.effort_rise_time[i].max(slowing / jerk);
+            limits.velocity[i] / slowing + rise
         };
-        2.0 * (0..4).map(axis).fold(0.0, f64::max)
+        STOP_MARGIN * (0..4).map(axis).fold(0.0, f64::max)
     }
 
     /// How far the lift may go down that moves down at `speed` (m/s) when its fault is reported, m.

@@ -31,6 +31,11 @@ pub(super) const EFFORT: Each<4> = joints(
     Allowed::above_zero(1e6, "N m"),
     Allowed::above_zero(1e7, "N"),
 );
+/// At least one sample of the fastest drives.
+pub(super) const RISE_TIME: Each<4> = joints(
+    Allowed::within(1e-4, 1.0, "s"),
+    Allowed::within(1e-4, 1.0, "s"),
+);
 pub(super) const GRAVITY: Allowed = Allowed::within(-100.0, 100.0, "m/s2");
 pub(super) const PAYLOAD_MAX: Allowed = Allowed::above_zero(100.0, "kg");
 pub(super) const GEAR_RATIO: Allowed = Allowed::within(0.01, 1e4, "");
@@ -142,15 +147,18 @@ pub struct Limits {
     /// Largest speeds.
     #[schemars(transform = by(VELOCITY))]
     pub velocity: [f64; 4],
-    /// Largest accelerations.
+    /// Largest accelerations, to protect the gears; without it torque alone is the limit.
     #[schemars(transform = by(ACCELERATION))]
-    pub acceleration_cap: [f64; 4],
-    /// Largest jerks.
+    pub acceleration_cap: Option<[f64; 4]>,
+    /// Largest jerks; likewise.
     #[schemars(transform = by(JERK))]
-    pub jerk_cap: [f64; 4],
+    pub jerk_cap: Option<[f64; 4]>,
     /// Largest efforts for a short time.
     #[schemars(transform = by(EFFORT))]
     pub effort_peak: [f64; 4],
+    /// Times in which the motors take up their peak from nothing; 0.010 without it.
+    #[schemars(transform = by(RISE_TIME))]
+    pub effort_rise_time_s: Option<[f64; 4]>,
     /// Largest root-mean-square efforts; at most the peak.
     #[schemars(transform = by(EFFORT))]
     pub effort_continuous_rms: [f64; 4],

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use super::file::{
     self, ACCELERATION, ANGLE, COORDINATE, EFFORT, GRAVITY, JERK, LENGTH, LINK_INERTIA, LINK_MASS,
-    PAYLOAD_MAX, POSITION, VELOCITY, keys,
+    PAYLOAD_MAX, POSITION, RISE_TIME, VELOCITY, keys,
 };
 use super::json::{self, Node};
 use super::{Geometry, JointLimits, Link, ModelError, Payload, RobotModel};
@@ -134,6 +134,9 @@ fn geometry(dh: &Node<'_>, warnings: &mut Vec<String>) -> Result<Geometry, Model
     })
 }
 
+/// For files that say nothing of it, s: a servo drive's current loop with the motor's inductance.
+const EFFORT_RISE_TIME: [f64; 4] = [0.010; 4];
+
 /// Four numbers of the joints.
 fn joints(node: &Node<'_>, key: &str, Each(allowed): Each<4>) -> Result<[f64; 4], ModelError> {
     let [turning, ..] = allowed;
@@ -147,15 +150,28 @@ fn joints(node: &Node<'_>, key: &str, Each(allowed): Each<4>) -> Result<[f64; 4]
     Ok(numbers)
 }
 
+/// [`joints`], if there are any.
+fn optional_joints(
+    node: &Node<'_>,
+    key: &str,
+    allowed: Each<4>,
+) -> Result<Option<[f64; 4]>, ModelError> {
+    node.optional(key)
+        .map(|_| joints(node, key, allowed))
+        .transpose()
+}
+
 fn limits(node: &Node<'_>, warnings: &mut Vec<String>) -> Result<JointLimits, ModelError> {
     node.warn_of_unknown(&keys::<file::Limits>(), warnings);
     let limits = JointLimits {
         lower: joints(node, "lower", POSITION)?,
         upper: joints(node, "upper", POSITION)?,
         velocity: joints(node, "velocity", VELOCITY)?,
-        acceleration: joints(node, "acceleration_cap", ACCELERATION)?,
-        jerk: joints(node, "jerk_cap", JERK)?,
+        acceleration: optional_joints(node, "acceleration_cap", ACCELERATION)?,
+        jerk: optional_joints(node, "jerk_cap", JERK)?,
         effort: joints(node, "effort_peak", EFFORT)?,
+        effort_rise_time: optional_joints(node, "effort_rise_time_s", RISE_TIME)?
+            .unwrap_or(EFFORT_RISE_TIME),
         effort_continuous: joints(node, "effort_continuous_rms", EFFORT)?,
     };
     each(node, "upper", limits.upper, limits.lower, |upper, lower| {
