@@ -21,7 +21,7 @@ use sim::rig::Rig;
 use sim::setup::RunConfig;
 
 /// Samples for which the arm has been moving when the fault is planted.
-const IN_MOTION: u32 = 100;
+const IN_MOTION: u32 = 90;
 /// Samples from the fault to the verdict: time for five heartbeats.
 const AFTERWARDS: u64 = 500;
 /// Most samples until the drives have switched torque off: they hold the last command for some, and a frame may be in

@@ -20,9 +20,10 @@ pub struct Body {
     pub lagrange: Lagrange,
     /// Motors, gears, coupling and friction.
     pub drive: Drive,
-    /// Greatest torques: of the joints, as they and the motors that turn one joint each allow, and of the motor of the wrist.
+    /// Greatest torques (N m, lift N): of the joints, as they and the motors that turn one joint each allow, and of the motor of the
+    /// wrist.
     pub torque_limit: Torques,
-    /// How fast they change at the most, 1/s.
+    /// How fast they change at the most (N m/s, lift N/s).
     pub torque_rate: Torques,
     /// Rotor inertia seen at the joints, A^T Jm A.
     rotor: Matrix4<f32>,

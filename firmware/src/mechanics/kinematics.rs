@@ -43,7 +43,7 @@ impl Trig {
         Self::in_line(q)
     }
 
-    /// The part that dynamics need, of elbow and wrist; the rest is not a number.
+    /// The part that dynamics need, of elbow and wrist; whatever depends on theta1 is NaN.
     // Out of line, like the above.
     #[inline(never)]
     #[must_use]

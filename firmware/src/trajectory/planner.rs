@@ -1,17 +1,17 @@
 //! From a request to a trajectory, one bounded step at a time.
 //!
 //! ```text
-//! Locate --> Survey --> Compose --> Balance --> Compose --> Jump --> Verify --> Finish
-//!   | path     | reach,    ^            |                   | strokes  | one time scale that keeps
-//!   |          | limits,   +-- rounds --+                   | over the | every sample inside every
-//!   |          | speeds    S-curve whose accelerations      | travel   | limit
-//!   |          |           fill the torque limits
-//!   +----------+----------------------------------------> Refusal (reason, axis, value, limit)
+//! Locate --> Survey --> Rest --> Compose --> Balance --> Compose --> Jump --> Verify, Load --> Finish
+//!   | path     | reach,   | jerk   ^            |                   | strokes  | one time scale that keeps
+//!   |          | limits,  |        +-- rounds --+                   | over the | every sample inside every
+//!   |          | speeds   |        S-curve whose accelerations      | travel   | limit
+//!   |          |          |        fill the torque limits
+//!   +----------+-------------------------------------------------> Refusal (reason, axis, value, limit)
 //! ```
 //!
 //! Constant joint acceleration limits would waste half of the robot: a SCARA is bounded by motor torque, and inertia
-//! changes along the way. The planner therefore scales an S-curve to the torques of the model. Torque is affine in the
-//! path acceleration, so each round corrects the two accelerations (speeding up, braking) by the worst ratio of torque
+//! changes along the way. The planner therefore scales an S-curve to the torques of the model. Its jerk follows from the time in
+//! which the motors take up their torque. Torque is affine in the path acceleration, so each round corrects the two accelerations (speeding up, braking) by the worst ratio of torque
 //! left to torque needed; in the last pass, inverse dynamics is quadratic in the time scale, and the planner solves for
 //! the scale at which the worst sample touches its limit (Hollerbach, *Dynamic scaling of manipulator
 //! trajectories*, 1984).

@@ -137,6 +137,7 @@ impl BuiltinBus {
     /// With a node of another bus.
     pub fn leave_off(&mut self, node: NodeId, from: Instant, until: Instant) {
         self.nodes[node.0].unattended.push((from, until));
+        self.next = self.foreseen();
     }
 
     /// Error counters of a node.

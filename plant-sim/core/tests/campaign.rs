@@ -326,9 +326,8 @@ fn a_verdict_gives_the_consequence() {
 
 /// Worked out by hand for 22 kg, from rest: 23.95 kg and 8.21 kg of rotor, 860 N and 235 N of weight. 8 ms at 34.0 m/s2 are 1.1 mm
 /// and 0.27 m/s; 30 ms of free fall from there 12.6 mm and 0.57 m/s; to stop that at 19.4 m/s2 takes 8.3 mm. From 1 m/s:
-/// 9.1 mm, 42.6 mm and 63.1 mm. The
-/// stretched arm has 39.0 kg m2 about the shoulder, rotor and load included; 7.68 rad/s are gone after 7.68 x 39.0 / 640 + 0.01 s, of which
-/// 1.25 times is the bound.
+/// 9.1 mm, 42.6 mm and 63.1 mm. The stretched arm has 39.0 kg m2 about the shoulder, rotor and load included; 7.68 rad/s are gone after
+/// 7.68 x 39.0 / 640 + 0.01 s, of which 1.25 times is the bound.
 #[test]
 fn bounds_are_those_worked_out_by_hand() {
     let mut bounds = Bounds::new(&RobotModel::irb_930_22_105(), 1e-3);

@@ -158,7 +158,8 @@ impl JointLimits {
         Rule::Positive.check_joint("limits.acceleration", &self.acceleration)?;
         Rule::Positive.check_joint("limits.jerk", &self.jerk)?;
         Rule::Positive.check_joint("limits.effort", &self.effort)?;
-        Rule::Positive.check_joint("limits.effort_rise_time", &self.effort_rise_time)?;
+        // In less than that no motor takes up its torque, and the rates would not be numbers any more.
+        Rule::Above(1e-5).check_joint("limits.effort_rise_time", &self.effort_rise_time)?;
         Rule::Positive.check_joint("limits.effort_continuous", &self.effort_continuous)
     }
 }

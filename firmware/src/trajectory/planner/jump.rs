@@ -197,7 +197,7 @@ impl Planner {
                     0.0
                 };
                 let here = stroke.at(lead + t);
-                // Between two knots the height above the chamfer is a cubic, and a cubic does not leave the hull of its control
+                // Between two knots the height above the chamfer is nearly a cubic, and a cubic does not leave the hull of its control
                 // points, of which two are a third of a step away from the knots.
                 let slope = if own < free_from {
                     (here.v - pace * across.v).abs()

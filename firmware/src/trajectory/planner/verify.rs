@@ -15,12 +15,13 @@ use crate::trajectory::{Reference, Trajectory};
 /// their own.
 const JOINT_STEPS: u8 = 16;
 pub(super) const LINE_STEPS: u8 = 24;
-/// Share of the limits of speed, acceleration and jerk that the samples of a line may use.
+/// Share of the limits of speed, acceleration and jerk that the samples of a line may use: there is more between them.
 const LINE_SHARE: f32 = 0.9;
 
-/// The same of those of acceleration and jerk, of a robot that has them.
+/// Further share of those of acceleration and jerk, of a robot that has them.
 const CAP_SHARE: f32 = 0.95;
 
+/// Share of the limits for the samples of this move.
 fn share(draft: &Trajectory) -> f32 {
     match draft.path {
         Path::Joint { .. } => 1.0,
@@ -131,6 +132,10 @@ impl Planner {
         let soon = t + 0.05 * step;
         let mut next = least(t + step, *span);
         next = least(next, start + profile.border_after(soon - start));
+        // Nor may the last one follow at once: a rate over no time is rounding.
+        if span - next < 0.05 * step {
+            next = *span;
+        }
         next
     }
 }

@@ -32,7 +32,7 @@ pub const SAMPLES_TO_REPORT: u32 = 4;
 /// Samples from a report until the brake is told at the latest: the drives hold a command for 5 samples, and a stop that an axis does
 /// not follow is given up at the 4th sample.
 const SAMPLES_TO_BRAKE: f64 = 8.0;
-/// For a plan that uses less than all of the torque, and builds it up at half its rate.
+/// For a stop that uses 0.945 of the torque, builds it up at half its rate, and has more axes to stop than one.
 const STOP_MARGIN: f64 = 1.25;
 /// The brake closes within this, s.
 const BRAKE_S: f64 = 0.03;
@@ -150,9 +150,12 @@ impl Bounds {
         let stretched = self.arm.at(&Vector4::zeros());
         let inertia = self.arm.mass_matrix(&stretched) + self.drive.rotor_inertia();
         let weight = self.arm.gravity(&stretched);
+        let motors = self
+            .drive
+            .joint_effort(&Vector4::from(self.model.drive.motor_torque_limit));
         let axis = |i: usize| {
-            let most = limits.effort[i];
-            let torque = (most - weight[i].abs()) / inertia[(i, i)];
+            let most = limits.effort[i].min(motors[i]);
+            let torque = (most - weight[i].abs()).max(0.0) / inertia[(i, i)];
             let cap = limits.acceleration.map_or(f64::INFINITY, |cap| cap[i]);
             let slowing = torque.min(cap);
             let jerk = limits.jerk.map_or(f64::INFINITY, |cap| cap[i]);
