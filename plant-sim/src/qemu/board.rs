@@ -202,7 +202,7 @@ impl Board {
         self.answer(sent)
     }
 
-    /// Sends a request.
+    /// Queues a request; it goes out with the next wait for an answer.
     pub(super) fn send_request(&mut self, request: &Request) -> Result<(), PeerError> {
         self.say(&request.to_bytes())
     }

@@ -72,7 +72,7 @@ impl Uart {
     }
 }
 
-/// The receive interrupt of UART 0: takes whatever has arrived until it has looked. STATE and INTCLEAR clear what is written as 1.
+/// The receive interrupt of UART 0: takes bytes until there are none, at most as many as the ring holds. STATE and INTCLEAR clear what is written as 1.
 pub(crate) fn receive() {
     FRAMES.write(INTCLEAR, INT_RX);
     for _ in 0..CAPACITY {
