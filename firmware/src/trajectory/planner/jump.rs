@@ -7,7 +7,8 @@
 //!
 //! Its corners are free, but not below a chamfer: the tool stays higher above the nearer end than it is away from it, or as
 //! high as was asked for. A stroke that only just reaches that height brakes on its last half; so the
-//! top is raised to where the stroke passes the height as fast as it can, if the strokes still fit into the travel.
+//! top is raised to where the stroke passes the height as fast as it can, or, if the strokes then take longer than the travel with
+//! its waits, to where both take the same time.
 
 use super::{NO_TRAVEL, Planner, Stage};
 use crate::mechanics::arm::ArmModel;
@@ -18,8 +19,10 @@ use crate::trajectory::profile::{Bounds, SCurve};
 use crate::trajectory::request::Gate;
 use crate::trajectory::torque_budget::TorqueBudget;
 
-/// Bisections of the height by which the top is raised.
-const BISECTIONS: u8 = 3;
+/// Heights that are tried at most: as asked for, as high as is useful, and three between them.
+const HEIGHTS: u8 = 5;
+/// Difference of two times that is none, s.
+const EQUAL: f32 = 1e-4;
 /// Instants at which stroke and travel are compared at each end, and how many in one step.
 const KNOTS: u8 = 8;
 const KNOTS_A_STEP: u8 = 2;
@@ -29,17 +32,29 @@ const OTHER_END: f32 = 0.3;
 /// Steps of planning at the most.
 pub(super) const STEPS: u32 = {
     let round = 2 + 2 * (1 + KNOTS / KNOTS_A_STEP) as u32 + 1;
-    2 + (BISECTIONS as u32 + 2) * round
+    2 + HEIGHTS as u32 * round
 };
+
+/// A height of the top that has been tried.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Tried {
+    /// Above the one asked for, m.
+    raise: f32,
+    /// Time that the strokes take longer than the travel with its waits, s.
+    excess: f32,
+}
 
 /// A jump that is being planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Jump {
     gate: Gate,
-    /// How much higher than asked for the top is, m: now, known to fit, and known not to; 0 is taken to fit.
+    /// How much higher than asked for the top is, m.
     raise: f32,
-    fits: f32,
-    too_high: f32,
+    /// The highest one whose strokes fit into the travel, and the lowest one whose do not.
+    fits: Tried,
+    too_high: Tried,
+    /// Whether the last one tried fits.
+    fitted: bool,
     round: u8,
     /// From the end of the travel to that of the descent, s.
     tail: f32,
@@ -50,8 +65,9 @@ impl Jump {
         Self {
             gate,
             raise: 0.0,
-            fits: 0.0,
-            too_high: 0.0,
+            fits: Tried::default(),
+            too_high: Tried::default(),
+            fitted: false,
             round: 0,
             tail: 0.0,
         }
@@ -69,6 +85,39 @@ impl Jump {
             self.gate.clearance.min(height)
         } else {
             height
+        }
+    }
+
+    /// The height to try after one at which the strokes take `excess` s longer than the travel with its waits: the same one if there
+    /// is none better. Both times are nearly straight over the height, so a chord finds where they are equal (regula falsi, with
+    /// the Illinois correction where one end of it stays).
+    #[inline(never)]
+    fn next(&mut self, excess: f32) -> f32 {
+        let here = Tried {
+            raise: self.raise,
+            excess,
+        };
+        let fits = excess <= 0.0;
+        let (first, lowest) = (self.round == 0, here.raise <= 0.0);
+        self.round += 1;
+        if excess.abs() < EQUAL || fits && first || !fits && lowest {
+            return here.raise;
+        }
+        let (replaced, kept) = if fits {
+            (&mut self.fits, &mut self.too_high)
+        } else {
+            (&mut self.too_high, &mut self.fits)
+        };
+        *replaced = here;
+        if fits == self.fitted {
+            kept.excess *= 0.5;
+        }
+        self.fitted = fits;
+        let (low, high) = (self.fits, self.too_high);
+        if first {
+            0.0
+        } else {
+            low.raise + (high.raise - low.raise) * low.excess / (low.excess - high.excess)
         }
     }
 
@@ -108,10 +157,10 @@ impl Planner {
         if free_from > NO_TRAVEL {
             let bounds = jump.bounds(budget, down);
             let wanted = SCurve::run_out(free_from, &bounds) - jump.height(down);
-            jump.too_high = jump.too_high.max(wanted.min(jump.gate.room));
+            jump.too_high.raise = jump.too_high.raise.max(wanted.min(jump.gate.room));
         }
         if down {
-            jump.raise = jump.too_high;
+            jump.raise = jump.too_high.raise;
         } else {
             self.stage = Stage::Raise { down: true };
         }
@@ -241,22 +290,8 @@ impl Planner {
         let needed = lift.up.duration() + lift.down.duration();
         self.draft.span = wanted.max(needed);
         lift.down_start = self.draft.span - lift.down.duration();
-        let first = jump.round == 0;
-        jump.round += 1;
-        let fits = needed <= wanted;
-        if fits {
-            jump.fits = jump.raise;
-        } else {
-            jump.too_high = jump.raise;
-        }
-        let next = if jump.raise <= 0.0 || first && fits {
-            jump.raise
-        } else if jump.round <= BISECTIONS {
-            0.5 * (jump.fits + jump.too_high)
-        } else {
-            jump.fits
-        };
-        self.stage = if next == jump.raise || jump.round > BISECTIONS + 1 {
+        let next = jump.next(needed - wanted);
+        self.stage = if next == jump.raise || jump.round >= HEIGHTS {
             Stage::VERIFY
         } else {
             jump.raise = next;

@@ -17,15 +17,17 @@ const JOINT_STEPS: u8 = 16;
 pub(super) const LINE_STEPS: u8 = 24;
 /// Share of the limits of speed, acceleration and jerk that the samples of a line may use: there is more between them.
 const LINE_SHARE: f32 = 0.9;
+/// The same for torque rates, of which the samples show the mean over a step.
+const LINE_RATE: f32 = 0.97;
 
 /// Further share of those of acceleration and jerk, of a robot that has them.
 const CAP_SHARE: f32 = 0.95;
 
-/// Share of the limits for the samples of this move.
-fn share(draft: &Trajectory) -> f32 {
+/// Shares of the limits for the samples of this move: of speed, acceleration and jerk; and of the torques' rates.
+fn shares(draft: &Trajectory) -> (f32, f32) {
     match draft.path {
-        Path::Joint { .. } => 1.0,
-        Path::Line { .. } => LINE_SHARE,
+        Path::Joint { .. } => (1.0, 1.0),
+        Path::Line { .. } => (LINE_SHARE, LINE_RATE),
     }
 }
 
@@ -51,7 +53,8 @@ impl Planner {
         before: Option<Before>,
     ) -> Result<(), Refusal> {
         let reference = self.draft.at(budget.arm, t).map_err(from_path)?;
-        let scale = budget.speed_scale(&reference.qd, share(&self.draft));
+        let (share, _) = shares(&self.draft);
+        let scale = budget.speed_scale(&reference.qd, share);
         self.stage = Stage::Load {
             t,
             time_scale: least(time_scale, scale),
@@ -74,11 +77,11 @@ impl Planner {
         if let Some(before) = before {
             let time = t - before.t;
             let change = torque - before.torque;
-            time_scale = least(time_scale, budget.rate_scale(&change, time));
+            let (share, rate) = shares(&self.draft);
+            time_scale = least(time_scale, budget.rate_scale(&change, rate * time));
             if budget.arm.limits.caps_acceleration() {
                 let jerk = (reference.qdd - before.qdd) / time;
-                let share = CAP_SHARE * share(&self.draft);
-                let scale = budget.cap_scale(&reference.qdd, &jerk, share);
+                let scale = budget.cap_scale(&reference.qdd, &jerk, CAP_SHARE * share);
                 time_scale = least(time_scale, scale);
             }
         }
