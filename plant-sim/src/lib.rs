@@ -7,6 +7,7 @@
 //! run                    one run into a folder: output (files that appear when complete)
 //! external, qemu         controllers in another process and on the emulated board, each beside a twin in this one (twin)
 //! campaign               many runs with faults: plans, shards, results
+//! bench                  gates in closed loop beside the optimum: times, errors, torques
 //! crash                  planted faults of the board, and how they end
 //! check, replay, plot    a trace judged, repeated and drawn
 //! mcap                   a trace or a run as MCAP, for Foxglove and Lichtblick
@@ -39,6 +40,7 @@
 // They panic where standard output or error is full or gone; `say!` and the sinks of results do not.
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
+pub mod bench;
 pub mod campaign;
 mod chart;
 pub mod check;
@@ -50,6 +52,7 @@ pub mod interrupt;
 pub mod mcap;
 pub mod monitor;
 pub mod output;
+mod parallel;
 pub mod parameters;
 pub mod play;
 pub mod plot;

@@ -40,6 +40,11 @@ impl Progress {
         Self::counting("case", LONG_PAUSE, total)
     }
 
+    /// At the start of a benchmark of this many rows.
+    pub fn of_rows(total: u64) -> Self {
+        Self::counting("row", PAUSE, total)
+    }
+
     fn counting(unit: &'static str, pause: Duration, total: u64) -> Self {
         let now = Instant::now();
         Self {

@@ -20,7 +20,7 @@ use serde::Serialize;
 
 use cycle::Cycle;
 pub use cycle::CycleResult;
-pub(crate) use offset::Offset;
+pub use offset::Offset;
 
 use crate::model::RobotModel;
 use crate::observer::Truth;

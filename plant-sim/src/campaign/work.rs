@@ -2,9 +2,6 @@
 
 use std::num::NonZero;
 use std::path::Path;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 use sim::campaign::case::Case;
 use sim::campaign::tally::Outcome;
@@ -15,6 +12,7 @@ use sim::controller::InProcess;
 use super::CampaignError;
 use super::plan::{self, Plan};
 use super::shard::{Beginning, Results, Shard, ShardHeader};
+use crate::parallel;
 use crate::progress::Progress;
 
 /// Cases of a batch for each thread. The threads wait for each other at its end, for as long as one case takes.
@@ -58,8 +56,10 @@ pub fn work(
             break;
         }
         let mut lines = String::new();
-        for outcome in outcomes(plan, batch, jobs) {
-            let outcome = outcome?;
+        let verdicts = parallel::map(&batch, jobs, |case| judge(plan, case));
+        for (case, verdict) in batch.into_iter().zip(verdicts) {
+            let verdict = verdict?;
+            let outcome = Outcome { case, verdict };
             done.cases += 1;
             done.missed += u64::from(!outcome.verdict.missed.is_empty());
             lines += &plan::line(&outcome);
@@ -70,33 +70,6 @@ pub fn work(
     }
     results.complete()?;
     Ok(done)
-}
-
-/// What becomes of these cases, in their order.
-fn outcomes(
-    plan: &Plan,
-    cases: Vec<Case>,
-    jobs: NonZero<usize>,
-) -> impl Iterator<Item = Result<Outcome, CampaignError>> {
-    let next = AtomicUsize::new(0);
-    let verdicts: Vec<OnceLock<Result<Verdict, CampaignError>>> =
-        cases.iter().map(|_| OnceLock::new()).collect();
-    thread::scope(|scope| {
-        for _ in 0..jobs.get() {
-            scope.spawn(|| {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(case) = cases.get(index) else { break };
-                    let _ = verdicts[index].set(judge(plan, case));
-                }
-            });
-        }
-    });
-    cases.into_iter().zip(verdicts).map(|(case, verdict)| {
-        let verdict = verdict.into_inner();
-        let verdict = verdict.expect("every index was taken by a thread")?;
-        Ok(Outcome { case, verdict })
-    })
 }
 
 /// What becomes of a case.

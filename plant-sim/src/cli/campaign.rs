@@ -1,10 +1,10 @@
 //! `plant-sim campaign`: many short runs with a fault each, judged.
 
+use std::env;
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
-use std::{env, thread};
 
 use clap::{Args, Subcommand};
 use plant_sim::campaign::plan::{self, Plan};
@@ -20,7 +20,7 @@ use sim::controller::InProcess;
 use sim::curves::Curves;
 use sim::summary::Collector;
 
-use super::values::count;
+use super::values::{count, jobs};
 use super::{Failure, show};
 
 /// Subcommands of `campaign`.
@@ -164,10 +164,7 @@ fn plan(args: &PlanArgs) -> Result<(), Failure> {
 
 fn work(args: &RunArgs) -> Result<(), Failure> {
     let shard = shard(args.shard.as_deref(), |name| env::var(name).ok()).map_err(Failure::usage)?;
-    let jobs = match args.jobs {
-        Some(jobs) => NonZero::try_from(jobs).unwrap_or(NonZero::<usize>::MAX),
-        None => thread::available_parallelism().unwrap_or(NonZero::<usize>::MIN),
-    };
+    let jobs = jobs(args.jobs);
     let plan = Plan::open(&args.plan)?;
     let done = work::work(&plan, shard, jobs, args.resume, &args.out)?;
     let out = args.out.display();

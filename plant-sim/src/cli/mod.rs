@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand.
 
 mod arrival;
+mod bench;
 mod bitrate;
 mod campaign;
 mod check;
@@ -57,6 +58,9 @@ enum Command {
     /// Run many cases with a fault each, on one machine or on a cluster, and judge them.
     #[command(subcommand)]
     Campaign(campaign::CampaignCommand),
+    /// Measure what the controller attains, beside what could be attained.
+    #[command(subcommand)]
+    Bench(bench::BenchCommand),
     /// Count the instructions and the stack that the controller takes on the emulated Cortex-M4F.
     Cost(cost::CostArgs),
     /// Plant faults into the controller on the emulated Cortex-M4F, and see how they end.
@@ -115,6 +119,7 @@ fn command(cli: Cli) -> Result<(), Failure> {
         Some(Command::Run(args)) => run::run(args.scenario.name(), &args.run),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::Campaign(command)) => campaign::run(&command),
+        Some(Command::Bench(command)) => bench::run(&command),
         Some(Command::Cost(args)) => cost::run(&args),
         Some(Command::Crash(args)) => crash::run(&args),
         Some(Command::Eval(args)) => eval::run(&args),

@@ -2,6 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use firmware::mechanics::arm::ArmModel;
+use plant_sim::bench;
 use plant_sim::campaign::cases::Cases;
 use plant_sim::parameters::Row;
 use plant_sim::reference::{markdown, of_input, of_output};
@@ -50,6 +51,8 @@ enum Name {
     Plan,
     /// cost --json.
     Cost,
+    /// bench motion --json.
+    MotionBench,
     /// A file of cases: campaign plan --cases (TOML; the schema is of the same keys and values in JSON).
     CampaignCases,
     /// A line of results of a campaign, but for the first: campaign run and merge.
@@ -70,6 +73,7 @@ impl Name {
             Self::Parameters => of_output::<Vec<Row>>(),
             Self::Plan => of_output::<Plan>(),
             Self::Cost => of_output::<Report>(),
+            Self::MotionBench => of_output::<bench::Report>(),
             Self::CampaignCases => of_input::<Cases>(),
             Self::CampaignResult => of_output::<Outcome>(),
             // The controller's own type knows nothing of schemas: one of its values shows what it is.

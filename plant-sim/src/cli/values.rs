@@ -2,6 +2,7 @@
 
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 /// Any number; what it may be is checked where it is used.
 pub(super) fn number(text: &str) -> Result<f64, String> {
@@ -20,6 +21,14 @@ pub(super) fn count(text: &str) -> Result<NonZero<u32>, String> {
     let most = u32::MAX;
     text.parse()
         .map_err(|_| format!("allowed: a whole number from 1 to {most}"))
+}
+
+/// Threads: as many as asked for, or as the machine has cores.
+pub(super) fn jobs(asked: Option<NonZero<u32>>) -> NonZero<usize> {
+    match asked {
+        Some(jobs) => NonZero::try_from(jobs).unwrap_or(NonZero::<usize>::MAX),
+        None => thread::available_parallelism().unwrap_or(NonZero::<usize>::MIN),
+    }
 }
 
 /// A file for an SVG: under another picture's name no program would show it.

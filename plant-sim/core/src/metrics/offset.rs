@@ -6,27 +6,29 @@ use crate::maths::{remainder, square};
 
 /// Offset of a tool from its target; neither part is negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Offset {
+pub struct Offset {
     /// m.
-    pub(crate) position: f64,
+    pub position: f64,
     /// rad, the shorter way round.
-    pub(crate) yaw: f64,
+    pub yaw: f64,
 }
 
 impl Offset {
-    pub(crate) const fn new(position: f64, yaw: f64) -> Self {
+    /// So far (m), and so far turned (rad).
+    pub const fn new(position: f64, yaw: f64) -> Self {
         Self { position, yaw }
     }
 
     /// Between two poses x, y, z (m), yaw (rad).
-    pub(crate) fn between([x, y, z, yaw]: &[f64; 4], to: &[f64; 4]) -> Self {
+    pub fn between([x, y, z, yaw]: &[f64; 4], to: &[f64; 4]) -> Self {
         Self {
             position: (square(x - to[0]) + square(y - to[1]) + square(z - to[2])).sqrt(),
             yaw: remainder(yaw - to[3], TAU).abs(),
         }
     }
 
-    pub(crate) fn is_within(self, radius: Self) -> bool {
+    /// Whether neither part is greater than that of `radius`.
+    pub fn is_within(self, radius: Self) -> bool {
         self.position <= radius.position && self.yaw <= radius.yaw
     }
 }

@@ -1,0 +1,204 @@
+//! The benchmark as tables: Markdown, which a terminal shows as well, and CSV.
+
+use std::fmt::Write as _;
+
+use serde_json::Value;
+
+use super::{Figures, Group, Report, Row};
+
+/// Everything, for people.
+pub fn text(report: &Report) -> String {
+    let mut text = format!("{}, {}.\n\n", report.robot, report.law);
+    text += "Over the places: means of times, shares and pause, worst of the others.\n\n";
+    let head: Vec<&str> = ["payload kg", "rate Hz"]
+        .into_iter()
+        .chain(FIGURES)
+        .collect();
+    text += &table(
+        &head,
+        report.groups.iter().map(|group| {
+            let mut cells = vec![group.payload_kg.to_string(), group.rate_hz.to_string()];
+            cells.extend(figures(&group.mean, &group.worst));
+            cells
+        }),
+    );
+    text += "\nEvery gate.\n\n";
+    let head: Vec<&str> = ["place", "payload kg", "rate Hz", "optimum s"]
+        .into_iter()
+        .chain(FIGURES)
+        .collect();
+    text += &table(
+        &head,
+        report.rows.iter().map(|row| {
+            let mut cells = vec![
+                row.place.clone(),
+                row.payload_kg.to_string(),
+                row.rate_hz.to_string(),
+                format!("{:.3}", row.optimum_s),
+            ];
+            cells.extend(figures(&row.figures, &row.figures));
+            cells
+        }),
+    );
+    text += "\nAnother robot than the controller believes: the worst over the places.\n\n";
+    text += &table(&MISMATCHED, report.mismatched_groups.iter().map(mismatched));
+    for row in report.rows.iter().chain(&report.mismatched) {
+        if let Some(fault) = &row.fault {
+            let _ = writeln!(
+                text,
+                "\n{} with {} kg at {} Hz, friction x {}, payload x {}: {fault}",
+                row.place, row.payload_kg, row.rate_hz, row.friction, row.payload
+            );
+        }
+    }
+    text
+}
+
+/// Columns of [`figures`].
+const FIGURES: [&str; 16] = [
+    "planned",
+    "to 1 mm",
+    "to 0.1 mm",
+    "to 0.01 mm",
+    "tracking max mm",
+    "rms mm",
+    "settling ms",
+    "overshoot mm",
+    "margin mm",
+    "torque %",
+    "rate %",
+    "speed %",
+    "RMS %",
+    "for ever at %",
+    "takes s",
+    "or pause s",
+];
+
+/// Times, shares and pause are from `mean`, errors and peaks from `worst`.
+fn figures(mean: &Figures, worst: &Figures) -> [String; FIGURES.len()] {
+    let percent = |share: Option<f64>| number(share.map(|share| share * 100.0), 0);
+    [
+        number(mean.planned_ratio, 3),
+        number(mean.to_1_mm_ratio, 3),
+        number(mean.to_0_1_mm_ratio, 3),
+        number(mean.to_0_01_mm_ratio, 3),
+        number(worst.tracking_max_mm, 3),
+        number(worst.tracking_rms_mm, 3),
+        number(worst.settling_ms, 1),
+        number(worst.overshoot_mm, 3),
+        number(worst.gate_margin_mm, 3),
+        percent(worst.torque_share),
+        percent(worst.torque_rate_share),
+        percent(worst.speed_share),
+        percent(mean.rms_share),
+        percent(mean.continuous_speed),
+        number(mean.continuous_cycle_s, 3),
+        number(mean.pause_s, 3),
+    ]
+}
+
+/// Columns of [`mismatched`].
+const MISMATCHED: [&str; 11] = [
+    "payload kg",
+    "rate Hz",
+    "friction x",
+    "payload x",
+    "to 0.01 mm",
+    "tracking max mm",
+    "settling ms",
+    "overshoot mm",
+    "torque %",
+    "at the limit ms",
+    "faults",
+];
+
+fn mismatched(group: &Group) -> Vec<String> {
+    let worst = &group.worst;
+    vec![
+        group.payload_kg.to_string(),
+        group.rate_hz.to_string(),
+        group.friction.to_string(),
+        group.payload.to_string(),
+        number(worst.to_0_01_mm_ratio, 3),
+        number(worst.tracking_max_mm, 3),
+        number(worst.settling_ms, 1),
+        number(worst.overshoot_mm, 3),
+        number(worst.torque_share.map(|share| share * 100.0), 0),
+        number(worst.saturation_ms, 1),
+        format!("{} of {}", group.faults, group.gates),
+    ]
+}
+
+fn number(value: Option<f64>, decimals: usize) -> String {
+    value.map_or("-".into(), |value| format!("{value:.decimals$}"))
+}
+
+/// A Markdown table whose columns are as wide as their widest cell.
+fn table(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let rows: Vec<Vec<String>> = rows.collect();
+    let widths: Vec<usize> = head
+        .iter()
+        .enumerate()
+        .map(|(column, name)| {
+            let cells = rows.iter().map(|row| row[column].len());
+            cells.fold(name.len(), usize::max)
+        })
+        .collect();
+    let line = |cells: &[&str]| {
+        let cells = cells.iter().zip(&widths);
+        let cells: Vec<String> = cells
+            .map(|(cell, width)| format!("{cell:>width$}"))
+            .collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
+    let rules: Vec<String> = widths
+        .iter()
+        .map(|width| "-".repeat(width - 1) + ":")
+        .collect();
+    let mut text = line(head) + &line(&rules.iter().map(String::as_str).collect::<Vec<_>>());
+    for row in &rows {
+        text += &line(&row.iter().map(String::as_str).collect::<Vec<_>>());
+    }
+    text
+}
+
+/// Every row, with and without mismatch, under the keys that they have in JSON.
+///
+/// # Errors
+/// Never for numbers and texts.
+pub fn csv(report: &Report) -> Result<String, String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let mut header = false;
+    for row in report.rows.iter().chain(&report.mismatched) {
+        let keys = cells(row)?;
+        if !header {
+            let names = keys.iter().map(|(name, _)| name);
+            writer
+                .write_record(names)
+                .map_err(|error| error.to_string())?;
+            header = true;
+        }
+        let values = keys.iter().map(|(_, value)| value);
+        writer
+            .write_record(values)
+            .map_err(|error| error.to_string())?;
+    }
+    let bytes = writer.into_inner().map_err(|error| error.to_string())?;
+    String::from_utf8(bytes).map_err(|error| error.to_string())
+}
+
+/// Keys and values of a row; what is `null` in JSON is blank.
+fn cells(row: &Row) -> Result<Vec<(String, String)>, String> {
+    let Value::Object(keys) = serde_json::to_value(row).map_err(|error| error.to_string())? else {
+        return Err("a row is an object".into());
+    };
+    let cell = |value: Value| match value {
+        Value::Null => String::new(),
+        Value::String(text) => text,
+        other => other.to_string(),
+    };
+    Ok(keys
+        .into_iter()
+        .map(|(key, value)| (key, cell(value)))
+        .collect())
+}

@@ -1,0 +1,76 @@
+//! `plant-sim bench`: what the controller attains, beside what could be attained.
+
+use std::num::NonZero;
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use plant_sim::bench::{self, Extent};
+use plant_sim::output::{self, File};
+
+use super::values::{count, jobs, svg};
+use super::{Failure, show};
+
+/// Subcommands of `bench`.
+#[derive(Subcommand)]
+pub(super) enum BenchCommand {
+    /// Measure gates in closed loop in seven places with four payloads: times beside the optimum, errors, torques, and how warm
+    /// the motors get; the same with another friction and payload than the controller believes.
+    Motion(MotionArgs),
+}
+
+/// Arguments of `motion`.
+#[derive(Args)]
+pub(super) struct MotionArgs {
+    /// Only one place, two payloads and one rate.
+    #[arg(long)]
+    quick: bool,
+    /// Threads; as many as the machine has cores if left out.
+    #[arg(long, value_name = "N", value_parser = count)]
+    jobs: Option<NonZero<u32>>,
+    /// Print JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+    /// Write every row to this file as CSV.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Draw the rows without mismatch into this file.
+    #[arg(long, value_name = "FILE", value_parser = svg)]
+    svg: Option<PathBuf>,
+}
+
+/// Executes a subcommand.
+pub(super) fn run(command: &BenchCommand) -> Result<(), Failure> {
+    match command {
+        BenchCommand::Motion(args) => motion(args),
+    }
+}
+
+/// Runs the benchmark and shows it. Fails where a gate was not completed.
+fn motion(args: &MotionArgs) -> Result<(), Failure> {
+    let outputs = args.csv.iter().chain(&args.svg).map(PathBuf::as_path);
+    output::distinct(None, outputs)?;
+    // What cannot be written is refused before the work.
+    let create = |path: &Option<PathBuf>| path.as_deref().map(File::create).transpose();
+    let (csv, svg) = (create(&args.csv)?, create(&args.svg)?);
+    let extent = if args.quick {
+        Extent::Quick
+    } else {
+        Extent::Whole
+    };
+    let report = bench::motion(extent, jobs(args.jobs)).map_err(Failure::failed)?;
+    if let Some(file) = csv {
+        output::finish(file, &bench::csv(&report)?)?;
+    }
+    if let Some(file) = svg {
+        output::finish(file, &bench::picture(&report))?;
+    }
+    if args.json {
+        let json = serde_json::to_string_pretty(&report).map_err(|error| error.to_string())?;
+        show(&(json + "\n"))?;
+    } else {
+        show(&bench::text(&report))?;
+    }
+    report
+        .failure()
+        .map_or(Ok(()), |why| Err(Failure::failed(why)))
+}

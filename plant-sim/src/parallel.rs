@@ -1,0 +1,32 @@
+//! The same work on every item of a list, on several threads.
+
+use std::num::NonZero;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+/// What `work` makes of each item, in their order, on `jobs` threads.
+pub(crate) fn map<I: Sync, O: Send + Sync>(
+    items: &[I],
+    jobs: NonZero<usize>,
+    work: impl Fn(&I) -> O + Sync,
+) -> Vec<O> {
+    let next = AtomicUsize::new(0);
+    let results: Vec<OnceLock<O>> = items.iter().map(|_| OnceLock::new()).collect();
+    thread::scope(|scope| {
+        for _ in 0..jobs.get() {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(item) = items.get(index) else { break };
+                    let _ = results[index].set(work(item));
+                }
+            });
+        }
+    });
+    results
+        .into_iter()
+        .map(OnceLock::into_inner)
+        .map(|result| result.expect("every index was taken by a thread"))
+        .collect()
+}
