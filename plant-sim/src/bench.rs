@@ -72,9 +72,9 @@ pub struct Row {
     /// Control rate, Hz.
     pub rate_hz: f64,
     /// True friction over the one that the controller believes in.
-    pub friction: f64,
+    pub friction_factor: f64,
     /// True payload over the announced one.
-    pub payload: f64,
+    pub payload_factor: f64,
     /// Round trip at the optimum, s.
     pub optimum_s: f64,
     /// Why the run was not completed; `null` where it was.
@@ -161,7 +161,7 @@ pub fn motion(extent: Extent, jobs: NonZero<usize>) -> Result<Report, String> {
     }
     let (rows, mismatched): (Vec<Row>, Vec<Row>) = rows
         .into_iter()
-        .partition(|row| row.friction == 1.0 && row.payload == 1.0);
+        .partition(|row| row.friction_factor == 1.0 && row.payload_factor == 1.0);
     Ok(Report {
         robot: RobotModel::irb_930_22_105().name,
         law: gate::law().to_string(),
@@ -173,21 +173,37 @@ pub fn motion(extent: Extent, jobs: NonZero<usize>) -> Result<Report, String> {
 }
 
 impl Report {
-    /// Why the benchmark has failed, if it has: a row that was not completed.
+    /// Why the benchmark has failed, if it has: gates that should have been completed and were not.
     pub fn failure(&self) -> Option<String> {
-        let all = || self.rows.iter().chain(&self.mismatched);
-        let faults = all().filter(|row| row.fault.is_some()).count();
-        let row = all().find(|row| row.fault.is_some())?;
-        let why = row.fault.as_deref().unwrap_or_default();
+        let all = self.rows.iter().chain(&self.mismatched);
+        let faults: Vec<&Row> = all.filter(|row| row.has_failed()).collect();
+        let first = faults.first()?;
         Some(format!(
-            "{faults} of {} gates were not completed; the first is {} with {} kg at {} Hz, friction x {}, payload x {}: {why}",
-            all().count(),
-            row.place,
-            row.payload_kg,
-            row.rate_hz,
-            row.friction,
-            row.payload,
+            "{} gates were not completed that should have been; the first is {}",
+            faults.len(),
+            first.ending()
         ))
+    }
+}
+
+impl Row {
+    /// Whether it has ended in a fault that it should not have ended in. Plans keep 5 % of the torque for what the controller does
+    /// not know: enough for another friction and a lighter payload, not for one that is a fifth heavier.
+    fn has_failed(&self) -> bool {
+        self.fault.is_some() && self.payload_factor <= 1.0
+    }
+
+    /// Which gate it is, and how it has ended.
+    fn ending(&self) -> String {
+        format!(
+            "{} with {} kg at {} Hz, friction x {}, payload x {}: {}",
+            self.place,
+            self.payload_kg,
+            self.rate_hz,
+            self.friction_factor,
+            self.payload_factor,
+            self.fault.as_deref().unwrap_or("completed")
+        )
     }
 }
 
@@ -208,8 +224,8 @@ fn measure(case: &Case) -> Result<Row, String> {
         stroke_deg: case.gate.stroke_deg,
         payload_kg: case.gate.payload_kg,
         rate_hz: case.rate_hz,
-        friction: case.mismatch.friction,
-        payload: case.mismatch.payload,
+        friction_factor: case.mismatch.friction,
+        payload_factor: case.mismatch.payload,
         optimum_s: case.gate.optimum_s,
         fault: summary.error,
         figures,

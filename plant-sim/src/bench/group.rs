@@ -13,9 +13,9 @@ pub struct Group {
     /// Control rate, Hz.
     pub rate_hz: f64,
     /// True friction over the one that the controller believes in.
-    pub friction: f64,
+    pub friction_factor: f64,
     /// True payload over the announced one.
-    pub payload: f64,
+    pub payload_factor: f64,
     /// Gates.
     pub gates: usize,
     /// How many of them were not completed; they are in neither of the following.
@@ -38,7 +38,12 @@ pub(super) fn groups(rows: &[Row]) -> Vec<Group> {
 }
 
 fn kind(row: &Row) -> [f64; 4] {
-    [row.rate_hz, row.payload_kg, row.friction, row.payload]
+    [
+        row.rate_hz,
+        row.payload_kg,
+        row.friction_factor,
+        row.payload_factor,
+    ]
 }
 
 fn group(rows: &[Row], of: [f64; 4]) -> Group {
@@ -50,12 +55,12 @@ fn group(rows: &[Row], of: [f64; 4]) -> Group {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let least = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
     let greatest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let [rate_hz, payload_kg, friction, payload] = of;
+    let [rate_hz, payload_kg, friction_factor, payload_factor] = of;
     Group {
         payload_kg,
         rate_hz,
-        friction,
-        payload,
+        friction_factor,
+        payload_factor,
         gates: all().count(),
         faults: all().count() - complete.len(),
         mean: each(&complete, mean),
@@ -109,8 +114,8 @@ mod tests {
             stroke_deg: 0.0,
             payload_kg,
             rate_hz: 1000.0,
-            friction: 1.0,
-            payload: 1.0,
+            friction_factor: 1.0,
+            payload_factor: 1.0,
             optimum_s: 0.3,
             fault: None,
             figures: Figures {

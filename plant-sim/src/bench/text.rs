@@ -6,56 +6,57 @@ use serde_json::Value;
 
 use super::{Figures, Group, Report, Row};
 
-/// Everything, for people.
+/// Everything, for people: what is over all places first.
 pub fn text(report: &Report) -> String {
-    let mut text = format!("{}, {}.\n\n", report.robot, report.law);
-    text += "Over the places: means of times, shares and pause, worst of the others.\n\n";
-    let head: Vec<&str> = ["payload kg", "rate Hz"]
-        .into_iter()
-        .chain(FIGURES)
-        .collect();
-    text += &table(
-        &head,
-        report.groups.iter().map(|group| {
-            let mut cells = vec![group.payload_kg.to_string(), group.rate_hz.to_string()];
-            cells.extend(figures(&group.mean, &group.worst));
-            cells
-        }),
+    let Report { robot, law, .. } = report;
+    let groups = || report.groups.iter();
+    let head = ["payload kg", "rate Hz"];
+    let of_group = |group: &Group| vec![group.payload_kg.to_string(), group.rate_hz.to_string()];
+    let mut text = format!(
+        "{robot}, {law}.\n\nRound trips over the optimum, means over the places; errors, the worst of them.\n\n"
     );
-    text += "\nEvery gate.\n\n";
-    let head: Vec<&str> = ["place", "payload kg", "rate Hz", "optimum s"]
-        .into_iter()
-        .chain(FIGURES)
-        .collect();
     text += &table(
-        &head,
-        report.rows.iter().map(|row| {
-            let mut cells = vec![
-                row.place.clone(),
-                row.payload_kg.to_string(),
-                row.rate_hz.to_string(),
-                format!("{:.3}", row.optimum_s),
-            ];
-            cells.extend(figures(&row.figures, &row.figures));
-            cells
-        }),
+        &[&head[..], &TIMES].concat(),
+        groups().map(|group| [of_group(group), times(&group.mean, &group.worst)].concat()),
     );
-    text += "\nAnother robot than the controller believes: the worst over the places.\n\n";
+    text += "\nPeaks over their limits, the worst of the places; cycles without end, means.\n\n";
+    text += &table(
+        &[&head[..], &EFFORTS].concat(),
+        groups().map(|group| [of_group(group), efforts(&group.mean, &group.worst)].concat()),
+    );
+    text += "\nAnother robot than the controller believes, the worst of the places.\n\n";
     text += &table(&MISMATCHED, report.mismatched_groups.iter().map(mismatched));
-    for row in report.rows.iter().chain(&report.mismatched) {
-        if let Some(fault) = &row.fault {
-            let _ = writeln!(
-                text,
-                "\n{} with {} kg at {} Hz, friction x {}, payload x {}: {fault}",
-                row.place, row.payload_kg, row.rate_hz, row.friction, row.payload
-            );
-        }
+    if let Some(row) = report.mismatched.iter().find(|row| row.fault.is_some()) {
+        let _ = writeln!(text, "\nThe first fault of these: {}.", row.ending());
     }
+    let rows = || report.rows.iter();
+    let head = ["place", "payload kg", "rate Hz"];
+    let of_row = |row: &Row| {
+        vec![
+            row.place.clone(),
+            row.payload_kg.to_string(),
+            row.rate_hz.to_string(),
+        ]
+    };
+    let optimum = |row: &Row| vec![format!("{:.3}", row.optimum_s)];
+    text += "\nEvery gate: round trips over the optimum, and errors.\n\n";
+    text += &table(
+        &[&head[..], &["optimum s"], &TIMES].concat(),
+        rows().map(|row| {
+            let figures = times(&row.figures, &row.figures);
+            [of_row(row), optimum(row), figures].concat()
+        }),
+    );
+    text += "\nEvery gate: peaks over their limits, and cycles without end.\n\n";
+    text += &table(
+        &[&head[..], &EFFORTS].concat(),
+        rows().map(|row| [of_row(row), efforts(&row.figures, &row.figures)].concat()),
+    );
     text
 }
 
-/// Columns of [`figures`].
-const FIGURES: [&str; 16] = [
+/// Columns of [`times`].
+const TIMES: [&str; 9] = [
     "planned",
     "to 1 mm",
     "to 0.1 mm",
@@ -65,19 +66,11 @@ const FIGURES: [&str; 16] = [
     "settling ms",
     "overshoot mm",
     "margin mm",
-    "torque %",
-    "rate %",
-    "speed %",
-    "RMS %",
-    "for ever at %",
-    "takes s",
-    "or pause s",
 ];
 
-/// Times, shares and pause are from `mean`, errors and peaks from `worst`.
-fn figures(mean: &Figures, worst: &Figures) -> [String; FIGURES.len()] {
-    let percent = |share: Option<f64>| number(share.map(|share| share * 100.0), 0);
-    [
+/// Times are from `mean`, errors from `worst`.
+fn times(mean: &Figures, worst: &Figures) -> Vec<String> {
+    vec![
         number(mean.planned_ratio, 3),
         number(mean.to_1_mm_ratio, 3),
         number(mean.to_0_1_mm_ratio, 3),
@@ -87,6 +80,23 @@ fn figures(mean: &Figures, worst: &Figures) -> [String; FIGURES.len()] {
         number(worst.settling_ms, 1),
         number(worst.overshoot_mm, 3),
         number(worst.gate_margin_mm, 3),
+    ]
+}
+
+/// Columns of [`efforts`].
+const EFFORTS: [&str; 7] = [
+    "torque %",
+    "torque rate %",
+    "speed %",
+    "RMS %",
+    "for ever at %",
+    "takes s",
+    "or pause s",
+];
+
+/// Peaks are from `worst`, what is of whole cycles from `mean`.
+fn efforts(mean: &Figures, worst: &Figures) -> Vec<String> {
+    vec![
         percent(worst.torque_share),
         percent(worst.torque_rate_share),
         percent(worst.speed_share),
@@ -117,13 +127,13 @@ fn mismatched(group: &Group) -> Vec<String> {
     vec![
         group.payload_kg.to_string(),
         group.rate_hz.to_string(),
-        group.friction.to_string(),
-        group.payload.to_string(),
+        group.friction_factor.to_string(),
+        group.payload_factor.to_string(),
         number(worst.to_0_01_mm_ratio, 3),
         number(worst.tracking_max_mm, 3),
         number(worst.settling_ms, 1),
         number(worst.overshoot_mm, 3),
-        number(worst.torque_share.map(|share| share * 100.0), 0),
+        percent(worst.torque_share),
         number(worst.saturation_ms, 1),
         format!("{} of {}", group.faults, group.gates),
     ]
@@ -131,6 +141,10 @@ fn mismatched(group: &Group) -> Vec<String> {
 
 fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or("-".into(), |value| format!("{value:.decimals$}"))
+}
+
+fn percent(share: Option<f64>) -> String {
+    number(share.map(|share| share * 100.0), 0)
 }
 
 /// A Markdown table whose columns are as wide as their widest cell.
