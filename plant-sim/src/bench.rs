@@ -22,15 +22,17 @@ mod text;
 mod watch;
 
 use std::num::NonZero;
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 use sim::model::RobotModel;
-use sim::run::in_process;
+use sim::run::{in_process, with_controller};
 use sim::setup::RunConfig;
 
 use crate::parallel;
 use crate::progress::Progress;
+use crate::qemu::{self, Qemu};
 use gate::Case;
 pub use group::Group;
 pub use picture::picture;
@@ -145,16 +147,29 @@ pub enum Extent {
     Quick,
 }
 
+/// Where the controller is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Controller {
+    /// In this process.
+    InProcess,
+    /// This image on the emulated board; every frame is compared with that of a controller in this process.
+    Qemu(PathBuf),
+}
+
 /// Runs the benchmark on `jobs` threads; the result does not depend on their number.
 ///
 /// # Errors
 /// A run that could not begin.
-pub fn motion(extent: Extent, jobs: NonZero<usize>) -> Result<Report, String> {
+pub fn motion(
+    extent: Extent,
+    controller: &Controller,
+    jobs: NonZero<usize>,
+) -> Result<Report, String> {
     let cases = gate::cases(extent);
     let mut progress = Progress::of_rows(cases.len() as u64);
     let mut rows = Vec::new();
     for batch in cases.chunks(BATCH * jobs.get()) {
-        for row in parallel::map(batch, jobs, measure) {
+        for row in parallel::map(batch, jobs, |case| measure(case, controller)) {
             rows.push(row?);
         }
         progress.add(batch.len() as u64);
@@ -208,12 +223,23 @@ impl Row {
 }
 
 /// Runs one case.
-fn measure(case: &Case) -> Result<Row, String> {
+fn measure(case: &Case, controller: &Controller) -> Result<Row, String> {
     let config = RunConfig::new(case.scenario());
     let named = |error: &dyn std::fmt::Display| format!("{}: {error}", config.scenario.name);
     let rig = config.rig().map_err(|error| named(&error))?;
     let mut watch = Watch::new(case, &rig.actual);
-    let summary = in_process(&config, &mut watch).map_err(|error| named(&error))?;
+    let summary = match controller {
+        Controller::InProcess => in_process(&config, &mut watch),
+        Controller::Qemu(image) => {
+            let options = qemu::Options {
+                image: Some(image.clone()),
+                ..qemu::Options::default()
+            };
+            let connect = |config| Qemu::start(config, &options);
+            with_controller(&config, connect, &mut (), &mut watch)
+        }
+    };
+    let summary = summary.map_err(|error| named(&error))?;
     let figures = match summary.error {
         None => watch.figures(case.gate.optimum_s, &summary),
         Some(_) => Figures::default(),

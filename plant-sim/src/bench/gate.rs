@@ -16,7 +16,7 @@ const Z: f64 = -0.25;
 /// How far the gate goes up, m.
 pub(super) const RISE: f64 = 0.025;
 /// Round trips of a run.
-pub(super) const CYCLES: u32 = 3;
+pub(super) const CYCLES: u32 = 2;
 /// Rest at each end, in which the tool has to settle, s.
 const DWELL: f64 = 0.25;
 /// Control rates, Hz.

@@ -3,9 +3,10 @@
 use std::num::NonZero;
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
-use plant_sim::bench::{self, Extent};
+use clap::{Args, Subcommand, ValueEnum};
+use plant_sim::bench::{self, Controller, Extent};
 use plant_sim::output::{self, File};
+use plant_sim::qemu;
 
 use super::values::{count, jobs, svg};
 use super::{Failure, show};
@@ -27,6 +28,10 @@ pub(super) struct MotionArgs {
     /// Threads; as many as the machine has cores if left out.
     #[arg(long, value_name = "N", value_parser = count)]
     jobs: Option<NonZero<u32>>,
+    /// Where the controller runs: in this process, or on an emulated Cortex-M4F, whose every frame is compared with that of the one
+    /// in this process.
+    #[arg(long, value_name = "WHERE", default_value = "in-process")]
+    controller: Place,
     /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
@@ -36,6 +41,12 @@ pub(super) struct MotionArgs {
     /// Draw the rows without mismatch into this file.
     #[arg(long, value_name = "FILE", value_parser = svg)]
     svg: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Place {
+    InProcess,
+    Qemu,
 }
 
 /// Executes a subcommand.
@@ -57,7 +68,14 @@ fn motion(args: &MotionArgs) -> Result<(), Failure> {
     } else {
         Extent::Whole
     };
-    let report = bench::motion(extent, jobs(args.jobs)).map_err(Failure::failed)?;
+    let controller = match args.controller {
+        Place::InProcess => Controller::InProcess,
+        Place::Qemu => {
+            let image = qemu::image(None, qemu::IMAGE).map_err(Failure::failed)?;
+            Controller::Qemu(image)
+        }
+    };
+    let report = bench::motion(extent, &controller, jobs(args.jobs)).map_err(Failure::failed)?;
     if let Some(file) = csv {
         output::finish(file, &bench::csv(&report)?)?;
     }
