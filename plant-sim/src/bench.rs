@@ -194,8 +194,9 @@ impl Report {
         let faults: Vec<&Row> = all.filter(|row| row.has_failed()).collect();
         let first = faults.first()?;
         Some(format!(
-            "{} gates were not completed that should have been; the first is {}",
+            "{} of {} gates were not completed that should have been; the first is {}",
             faults.len(),
+            self.rows.len() + self.mismatched.len(),
             first.ending()
         ))
     }
@@ -256,4 +257,39 @@ fn measure(case: &Case, controller: &Controller) -> Result<Row, String> {
         fault: summary.error,
         figures,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_fails_unless_the_payload_is_heavier_than_announced() {
+        let row = |payload_factor, fault: Option<&str>| Row {
+            place: "best".into(),
+            radius_m: 0.6,
+            stroke_deg: 135.0,
+            payload_kg: 2.0,
+            rate_hz: 1000.0,
+            friction_factor: 1.0,
+            payload_factor,
+            optimum_s: 0.254,
+            fault: fault.map(str::to_owned),
+            figures: Figures::default(),
+        };
+        let report = |fault| Report {
+            robot: String::new(),
+            law: String::new(),
+            rows: vec![row(1.0, fault)],
+            groups: Vec::new(),
+            mismatched: vec![row(1.2, Some("too heavy"))],
+            mismatched_groups: Vec::new(),
+        };
+        assert_eq!(report(None).failure(), None);
+        let why = report(Some("it broke")).failure().unwrap();
+        assert!(
+            why.starts_with("1 of 2 gates ") && why.ends_with(": it broke"),
+            "{why}"
+        );
+    }
 }

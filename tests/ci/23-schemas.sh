@@ -54,6 +54,12 @@ validate controller-model "$work/controller-model.json"
 "$plant_sim" check --set cycle[0].jump.top=-0.29 --json >"$work/refused.json" 2>"$work/refused.err" && fail "nothing is refused"
 validate plan "$work/plan.json" "$work/refused.json"
 
+echo "- gates beside the optimum, complete and not"
+"$plant_sim" bench motion --quick --json >"$work/bench.json"
+grep -q '"fault": "' "$work/bench.json"
+grep -q '"fault": null' "$work/bench.json"
+validate motion-bench "$work/bench.json"
+
 echo "- cases and results of a campaign"
 validate campaign-cases plant-sim/campaigns/*.toml
 "$plant_sim" campaign plan --count 20 >"$work/campaign.jsonl"

@@ -28,6 +28,10 @@ for scenario in gate square pick-place; do
     echo "  $scenario: $(wc -l <"$work/board/trace.log") frames equal"
 done
 
+echo "- the gates of the benchmark are the same on the board"
+"$plant_sim" bench motion --quick --json >"$work/bench.json"
+"$plant_sim" bench motion --quick --json --controller qemu | cmp - "$work/bench.json"
+
 echo "- the log has every change of mode, and nothing in it is damaged"
 for message in 'started: PowerOn' 'Enabled (None)' 'Moving (None)' 'Ready (None)'; do
     grep -q "INFO $message" "$work/board/controller.log"

@@ -97,7 +97,7 @@ fn draw(page: &mut Svg, top: f64, panel: &Panel, rows: &[Row]) {
     let y = |value: f64| bottom - HEIGHT * (value - panel.from) / (high - panel.from);
     page.text(LEFT, top - 8.0, r#"font-weight="bold""#, panel.title);
     for (index, (_, colour, name)) in panel.bars.iter().enumerate() {
-        let x = LEFT + WIDTH - 120.0 * (panel.bars.len() - index) as f64;
+        let x = LEFT + WIDTH - 140.0 * (panel.bars.len() - index) as f64;
         page.rectangle([x, top - 18.0, 10.0, 10.0], &format!(r#"fill="{colour}""#));
         page.text(x + 16.0, top - 9.0, "", name);
     }
@@ -105,6 +105,9 @@ fn draw(page: &mut Svg, top: f64, panel: &Panel, rows: &[Row]) {
         let at = y(tick.value);
         page.across(LEFT, LEFT + WIDTH, at, r##"stroke="#ddd""##);
         page.text(LEFT - 6.0, at + 4.0, r#"text-anchor="end""#, &tick.label);
+    }
+    for index in beginnings(rows) {
+        page.down(slot(rows, index).0, top, bottom, r##"stroke="#999""##);
     }
     for (index, row) in rows.iter().enumerate() {
         let (left, width) = slot(rows, index);
@@ -126,22 +129,29 @@ fn draw(page: &mut Svg, top: f64, panel: &Panel, rows: &[Row]) {
     page.across(LEFT, LEFT + WIDTH, bottom, r#"stroke="black""#);
 }
 
-/// Places under the bars, and where another payload or rate begins.
+/// Rows that begin another payload or rate.
+fn beginnings(rows: &[Row]) -> impl Iterator<Item = usize> {
+    let kind = |index: usize| rows.get(index).map(|row| (row.payload_kg, row.rate_hz));
+    (0..rows.len()).filter(move |index| {
+        let before = index.checked_sub(1).and_then(kind);
+        before != kind(*index)
+    })
+}
+
+/// Places, payloads and rates under the bars.
 fn names(page: &mut Svg, bottom: f64, rows: &[Row]) {
-    let kind = |row: &Row| (row.payload_kg, row.rate_hz);
-    let mut last = None;
     for (index, row) in rows.iter().enumerate() {
         let (left, width) = slot(rows, index);
         let (x, y) = (left + width / 2.0 + 4.0, bottom + 8.0);
-        let style =
-            format!(r#"font-size="10" text-anchor="end" transform="rotate(-90 {x:.1} {y:.1})""#);
+        let turned = format!(r#"transform="rotate(-90 {x:.1} {y:.1})""#);
+        let style = format!(r#"font-size="10" text-anchor="end" {turned}"#);
         page.text(x, y, &style, &row.place);
-        if last != Some(kind(row)) {
-            last = Some(kind(row));
-            page.down(left, TOP, bottom + 70.0, r##"stroke="#999""##);
-            let (kg, hz) = kind(row);
-            page.text(left + 4.0, bottom + 72.0, "", &format!("{kg} kg, {hz} Hz"));
-        }
+    }
+    for index in beginnings(rows) {
+        let (left, _) = slot(rows, index);
+        let row = &rows[index];
+        let name = format!("{} kg, {} Hz", row.payload_kg, row.rate_hz);
+        page.text(left + 4.0, bottom + 72.0, "", &name);
     }
 }
 

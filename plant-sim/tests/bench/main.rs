@@ -9,30 +9,18 @@
     reason = "a test fails by panicking"
 )]
 
+mod truth;
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use ::plant_sim::bench::gate::gates;
 use serde_json::Value;
-
-/// Of the robot: lengths, m; limits, N m and N; continuous ratings; dry friction and its speeds (plant-sim/models).
-const A: [f64; 2] = [0.56, 0.49];
-const FLANGE: f64 = 0.1213;
-const PEAK: [f64; 4] = [640.0, 400.0, 860.0, 30.0];
-const RATED: [f64; 4] = [216.0, 127.0, 287.0, 10.2];
-const SPEED: [f64; 4] = [
-    7.679_448_708_775_05,
-    12.217_304_763_960_307,
-    2.2,
-    29.670_597_283_903_604,
-];
-const COULOMB: [f64; 4] = [12.0, 6.0, 20.0, 0.6];
-const EPS: [f64; 4] = [0.01, 0.01, 0.001, 0.01];
-const RISE_TIME: f64 = 0.010;
-
-/// Height of the ends, and of the gate above them.
-const Z: f64 = -0.25;
-const RISE: f64 = 0.025;
+use truth::{
+    COULOMB, EPS, PEAK, RISE, RISE_TIME, SPEED, Truth, Z, across, distance, motions, rms, scenario,
+    tool, truth,
+};
 
 fn plant_sim(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_plant-sim"))
@@ -46,96 +34,6 @@ fn bench(folder: &Path, arguments: &[&str]) -> String {
     let output = plant_sim(folder, &[&["bench", "motion"], arguments].concat());
     assert!(output.status.success(), "{output:?}");
     String::from_utf8(output.stdout).unwrap()
-}
-
-/// The gate in the place `mid-tan`, as anyone would write it.
-fn scenario(kg: f64, speed: f64, dwell: f64) -> String {
-    let start = "[0.7, -0.15, -0.25, 0.0]";
-    let jump = |to: &str| {
-        format!(
-            "[[cycle]]\njump = {{ to = {to}, top = -0.225, speed = {speed} }}\n[[cycle]]\ndwell = {dwell}\n"
-        )
-    };
-    format!(
-        "name = \"mid-tan\"\ncycles = 2\nrate_hz = 1000\nlaw = \"computed-torque:observer\"\nstart = {start}\n\
-         [payload]\nmass = {kg}\ncom_flange_frame = [0.0, 0.0, 0.05]\n\
-         inertia_com_diag = [{0}, {0}, {1}]\n{2}{3}",
-        0.004 * kg,
-        0.005 * kg,
-        jump("[0.7, 0.15, -0.25, 0.0]"),
-        jump(start)
-    )
-}
-
-/// A row of `truth.csv`.
-struct Truth {
-    t: f64,
-    q: [f64; 4],
-    qd: [f64; 4],
-    reference: [f64; 4],
-    moves: bool,
-    tau: [f64; 4],
-    tool: [f64; 4],
-}
-
-/// What an ordinary run of `scenario` leaves.
-fn truth(folder: &Path, scenario: &str) -> Vec<Truth> {
-    fs::write(folder.join("gate.toml"), scenario).unwrap();
-    let run = ["run", "--scenario", "gate.toml", "--no-report", "-q"];
-    let output = plant_sim(folder, &run);
-    assert!(output.status.success(), "{output:?}");
-    let mut reader = csv::Reader::from_path(folder.join("out/truth.csv")).unwrap();
-    let rows = reader.records().map(|row| {
-        let row = row.unwrap();
-        let four = |from: usize| std::array::from_fn(|axis| row[from + axis].parse().unwrap());
-        let rqd: [f64; 4] = four(13);
-        Truth {
-            t: row[0].parse().unwrap(),
-            q: four(1),
-            qd: four(5),
-            reference: four(9),
-            moves: rqd != [0.0; 4],
-            tau: four(17),
-            tool: four(21),
-        }
-    });
-    rows.collect()
-}
-
-/// The tool by the cosines of a drawing.
-fn tool([q1, q2, q3, q4]: &[f64; 4]) -> [f64; 4] {
-    let (upper, fore) = (*q1, q1 + q2);
-    [
-        A[0] * upper.cos() + A[1] * fore.cos(),
-        A[0] * upper.sin() + A[1] * fore.sin(),
-        -q3 - FLANGE,
-        fore - q4,
-    ]
-}
-
-fn distance(a: &[f64; 4], b: &[f64; 4]) -> f64 {
-    ((a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2) + (a[2] - b[2]).powi(2)).sqrt()
-}
-
-fn across(a: &[f64; 4], b: &[f64; 4]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
-/// Indices of the motions: the first sample at which the reference moves, and the first at which it rests again.
-fn motions(rows: &[Truth]) -> Vec<(usize, usize)> {
-    let mut motions = Vec::new();
-    let mut from = None;
-    for (index, row) in rows.iter().enumerate() {
-        match (row.moves, from) {
-            (true, None) => from = Some(index),
-            (false, Some(begun)) => {
-                motions.push((begun, index));
-                from = None;
-            }
-            _ => {}
-        }
-    }
-    motions
 }
 
 #[track_caller]
@@ -245,43 +143,117 @@ fn a_row_is_what_the_truth_of_an_ordinary_run_says() {
     assert_eq!(row["fault"], Value::Null);
 }
 
-/// Root mean square over the continuous rating while the reference moves, of the worst axis.
-fn rms(rows: &[Truth], motions: &[(usize, usize)]) -> f64 {
-    let moving = || {
-        motions
-            .iter()
-            .flat_map(|&(begun, ended)| &rows[begun..=ended])
-    };
-    let shares = (0..4).map(|axis| {
-        let sum: f64 = moving().map(|row| row.tau[axis].powi(2)).sum();
-        (sum / moving().count() as f64).sqrt() / RATED[axis]
-    });
-    shares.fold(0.0, f64::max)
-}
-
 /// At the speed that is said to do for ever, a run that is asked for that speed is at its rating, and takes as long as is said.
 #[test]
 fn a_run_at_the_speed_for_ever_is_at_its_rating() {
     let folder = tempfile::tempdir().unwrap();
     let report: Value =
         serde_json::from_str(&bench(folder.path(), &["--quick", "--json"])).unwrap();
-    for (index, kg) in [2.0, 22.0].into_iter().enumerate() {
-        let row = &report["rows"][index];
-        let speed = row["continuous_speed"].as_f64().unwrap();
+    for (row, kg) in [2.0, 22.0].into_iter().enumerate() {
+        let row = &report["rows"][row];
+        let figure = |name: &str| row[name].as_f64().unwrap();
+        let speed = figure("continuous_speed");
         let rows = truth(folder.path(), &scenario(kg, speed, 0.25));
         let motions = motions(&rows);
+        let ways = motions.iter();
+        let ways = ways.map(|&(begun, ended)| rows[ended].t - rows[begun - 1].t);
+        let cycle = ways.sum::<f64>() / 2.0;
+        // A way begins and ends between two samples, here and there: so much of it is more or less.
+        let samples = 2.0 * 2.0;
+        let said = figure("continuous_cycle_s");
+        assert!(
+            (cycle - said).abs() < samples * 0.001,
+            "{kg}: {cycle} {said}"
+        );
         let rms = rms(&rows, &motions);
-        let cycle: f64 = motions
-            .iter()
-            .map(|&(begun, ended)| rows[ended].t - rows[begun - 1].t)
-            .sum();
-        println!(
-            "{kg} kg: {speed} {rms} {} {}",
-            cycle / 2.0,
-            row["continuous_cycle_s"]
+        assert!((rms - 1.0).abs() < samples * 0.001 / cycle, "{kg}: {rms}");
+        assert!(figure("rms_share") > 1.0 && figure("pause_s") > 0.0);
+    }
+}
+
+/// What holds for every gate, whatever the numbers.
+#[test]
+fn no_gate_is_faster_than_the_optimum_and_finer_takes_longer() {
+    let folder = tempfile::tempdir().unwrap();
+    let report: Value = serde_json::from_str(&bench(folder.path(), &["--json"])).unwrap();
+    let all = |key: &str| report[key].as_array().unwrap().clone();
+    let rows = all("rows");
+    assert_eq!(
+        (rows.len(), all("mismatched").len()),
+        (7 * 4 * 2, 7 * 14 * 2)
+    );
+    let figure = |row: &Value, name: &str| row[name].as_f64().unwrap();
+    for row in &rows {
+        let of = |name| figure(row, name);
+        let finer = [
+            1.0,
+            of("to_1_mm_ratio"),
+            of("to_0_1_mm_ratio"),
+            of("to_0_01_mm_ratio"),
+        ];
+        assert!(
+            finer.is_sorted_by(|a, b| a < b) && of("planned_ratio") > 1.0,
+            "{row}"
+        );
+        assert!(
+            of("torque_share") <= 1.0 && of("speed_share") <= 1.0,
+            "{row}"
+        );
+        assert!(of("tracking_rms_mm") <= of("tracking_max_mm"), "{row}");
+        // What never stops can go no faster than what rests between two cycles of full speed.
+        assert!(of("continuous_cycle_s") >= of("planned_s"), "{row}");
+        assert!(
+            of("continuous_cycle_s") <= of("planned_s") + of("pause_s"),
+            "{row}"
         );
     }
-    panic!();
+    // Only what is heavier than announced may have needed more torque than there is.
+    for row in all("mismatched") {
+        assert!(
+            row["fault"].is_null() || figure(&row, "payload_factor") > 1.0,
+            "{row}"
+        );
+        assert_eq!(row["fault"].is_null(), row["planned_s"].is_f64(), "{row}");
+    }
+    for group in all("groups") {
+        let members = rows.iter().filter(|row| {
+            ["payload_kg", "rate_hz"]
+                .iter()
+                .all(|key| row[key] == group[key])
+        });
+        let ratios: Vec<f64> = members.map(|row| figure(row, "planned_ratio")).collect();
+        assert_eq!(ratios.len(), 7);
+        let mean = figure(&group["mean"], "planned_ratio");
+        assert!(
+            (mean - ratios.iter().sum::<f64>() / 7.0).abs() < 1e-12,
+            "{group}"
+        );
+    }
+}
+
+/// The planner is held to the same places and optima as the benchmark.
+#[test]
+fn the_optima_are_those_of_the_test_of_the_planner() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let test = fs::read_to_string(root.join("../firmware/tests/optimum.rs")).unwrap();
+    let test: String = test.split_whitespace().collect();
+    let gates = gates();
+    for of_payload in gates.chunks(7) {
+        let places = of_payload
+            .iter()
+            .map(|gate| format!("({:.2},{:.1})", gate.radius_m, gate.stroke_deg));
+        assert!(test.contains(&places.collect::<Vec<_>>().join(",")));
+        let optima = of_payload
+            .iter()
+            .map(|gate| format!("{:.3}", gate.optimum_s));
+        let optima = optima.collect::<Vec<_>>().join(",");
+        let row = format!("({:.1},[{optima}],", of_payload[0].payload_kg);
+        assert!(
+            test.contains(&row),
+            "firmware/tests/optimum.rs has no {row}"
+        );
+    }
+    assert_eq!(gates.len(), 28);
 }
 
 #[test]
