@@ -74,11 +74,13 @@ impl Load {
     /// The pause after a cycle of `cycle` s at full speed with which no axis exceeds its rating, s; `None` where holding the arm
     /// still already does.
     pub(super) fn pause(&self, ratings: &[f64; 4], cycle: f64) -> Option<f64> {
+        let mean = |sum: f64, samples: u64| sum / samples.max(1) as f64;
+        let axes = self.moving.iter().zip(&self.resting).zip(ratings);
         let mut longest = 0.0_f64;
-        for axis in 0..4 {
-            let allowed = ratings[axis] * ratings[axis];
-            let moving = self.moving[axis].iter().sum::<f64>() / self.moving_samples.max(1) as f64;
-            let resting = self.resting[axis] / self.resting_samples.max(1) as f64;
+        for ((moving, resting), rating) in axes {
+            let allowed = rating * rating;
+            let moving = mean(moving.iter().sum(), self.moving_samples);
+            let resting = mean(*resting, self.resting_samples);
             if moving > allowed {
                 if resting >= allowed {
                     return None;
