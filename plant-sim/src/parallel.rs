@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// What `work` makes of each item, in their order, on `jobs` threads.
+/// What `work` makes of each item, in their order, on `jobs` threads, or as many as there are items.
 pub(crate) fn map<I: Sync, O: Send + Sync>(
     items: &[I],
     jobs: NonZero<usize>,
@@ -14,7 +14,7 @@ pub(crate) fn map<I: Sync, O: Send + Sync>(
     let next = AtomicUsize::new(0);
     let results: Vec<OnceLock<O>> = items.iter().map(|_| OnceLock::new()).collect();
     thread::scope(|scope| {
-        for _ in 0..jobs.get() {
+        for _ in 0..jobs.get().min(items.len()) {
             scope.spawn(|| {
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
