@@ -113,6 +113,15 @@ mod tests {
         assert!((pause - 6.5 / 0.75).abs() < 1e-12);
     }
 
+    /// At half the speed, 1 + 2 / 2 + 3 / 4.
+    #[test]
+    fn each_part_goes_with_its_power_of_the_speed() {
+        let mut load = Load::default();
+        load.moving(&[[0.0; 3], [0.0; 3], [0.0; 3], [1.0, 2.0, 3.0]]);
+        assert!((load.rms_share(&[1.0; 4], 0.5) - 2.75).abs() < 1e-12);
+        assert!((load.rms_share(&[1.0; 4], 1.0) - 6.0).abs() < 1e-12);
+    }
+
     #[test]
     fn what_cannot_be_held_has_no_speed_and_no_pause() {
         let mut load = Load::default();
