@@ -57,6 +57,7 @@ fn state(mode: Mode, cause: Cause) -> CanFrame {
         fault_axis: FaultAxis::Lift,
         fault_value: 2.5,
         fault_limit: 2.42,
+        pace: 100,
     };
     codec::encode(&Message::State(state), 0).unwrap()
 }

@@ -156,6 +156,7 @@ pub(crate) const MOTION: &[Signal] = &[
     when(9, "bandwidth", 2, range(0.0, 1000.0), one!("rad/s")),
     when(9, "damping", 6, range(0.0, 10.0), one!("")),
     when(9, "observer", 10, range(0.0, 1000.0), one!("rad/s")),
+    when(10, "override_pace", 2, FRACTION, one!("")),
 ];
 
 /// Report of the controller.
@@ -180,6 +181,7 @@ pub(crate) const STATE: &[Signal] = &[
     // The unit depends on the cause.
     signal("fault_value", 33, ANY, one!("")),
     signal("fault_limit", 37, ANY, one!("")),
+    signal("pace", 41, Kind::U8, one!("%")),
 ];
 
 /// Answer to a request.

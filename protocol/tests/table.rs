@@ -146,6 +146,9 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                     one("damping", damping),
                     one("observer", observer),
                 ],
+                MotionRequest::SetOverride { pace } => {
+                    vec![one("request", 10), one("override_pace", pace)]
+                }
             });
             values
         }
@@ -164,6 +167,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
             one("fault_axis", m.fault_axis.code()),
             one("fault_value", m.fault_value),
             one("fault_limit", m.fault_limit),
+            one("pace", m.pace),
         ],
         Message::MotionReply(m) => match m.outcome {
             Outcome::Accepted => vec![one("sequence", m.sequence), one("outcome", 0)],

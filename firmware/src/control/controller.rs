@@ -213,6 +213,11 @@ impl Controller {
         self.queue.is_planning()
     }
 
+    /// Share of its planned speed at which a move passes or would pass now.
+    pub fn pace(&self) -> f32 {
+        self.queue.pace_now()
+    }
+
     /// Number of the last move that was completed.
     pub fn completed(&self) -> u8 {
         self.queue.completed()
@@ -318,6 +323,7 @@ impl Controller {
         if limited.flags != LimitFlags::EMPTY {
             self.limits = self.limits | limited.flags;
             let qd = motion.qd;
+            self.ease(&torque, &qd);
             self.strain(readings, &qd);
         }
         probe.end(Phase::Limits);
@@ -325,6 +331,27 @@ impl Controller {
             control: self.control_word(),
             torque: limited.motor_torque.into(),
         }
+    }
+
+    /// Slows down a move for which the axes would need more torque than there is, as with a heavier load than was announced.
+    // Out of line: rare in a sample.
+    #[inline(never)]
+    fn ease(&mut self, torque: &Vector4<f32>, qd: &Vector4<f32>) {
+        if self.state != State::Moving {
+            return;
+        }
+        let (arm, drive) = (&self.config.arm, &self.body.drive);
+        let joint = torque.component_div(&arm.limits.effort);
+        let motor = drive
+            .motor_torque(torque)
+            .component_div(&arm.drive.motor_torque_limit);
+        let needed = joint.abs().sup(&motor.abs());
+        let axis = needed.imax();
+        let speeds_up = torque
+            .get(axis)
+            .zip(qd.get(axis))
+            .is_some_and(|(torque, qd)| torque * qd > 0.0);
+        self.queue.ease(needed.max(), speeds_up);
     }
 
     /// Counts samples in which an axis hardly moves at its torque limit. An axis that speeds up may be at its limit; one that

@@ -3,7 +3,7 @@
 use nalgebra::Vector4;
 
 use super::Reference;
-use super::torque_budget::{Braking, STOP_SHARE, TorqueBudget, ratio, slower};
+use super::torque_budget::{Ramp, TorqueBudget, ratio, slower};
 use crate::mechanics::math::{cbrt, sqrt};
 
 impl TorqueBudget<'_> {
@@ -18,19 +18,26 @@ impl TorqueBudget<'_> {
         acceleration.min(cbrt(within(&limits.jerk, jerk)))
     }
 
-    /// Keeps a stop within the limits: of a trajectory whose motion is `rest`, and which would have the speed `qd` if its clock had not
-    /// been slowed down.
+    /// Keeps a change of the time scale within the limits, with this share of the jerk: of a trajectory whose motion is `rest`, and
+    /// which would have the speed `qd` at full pace.
     #[cold]
-    pub(super) fn cap_braking(&self, rest: &Reference, qd: &Vector4<f32>, braking: &mut Braking) {
+    pub(super) fn cap_ramp(
+        &self,
+        rest: &Reference,
+        qd: &Vector4<f32>,
+        share: f32,
+        ramp: &mut Ramp,
+    ) {
         let limits = &self.arm.limits;
         let joints = qd.iter().zip(rest.qdd.iter());
         for ((qd, qdd), (acceleration, jerk)) in
             joints.zip(limits.acceleration.iter().zip(limits.jerk.iter()))
         {
-            // An acceleration along the motion leaves more room for slowing down.
+            // An acceleration along the motion leaves more room for slowing down, and less for speeding up.
             let own = if *qd > 0.0 { *qdd } else { -qdd };
-            braking.slope = slower(braking.slope, (acceleration + own).max(0.0), *qd);
-            braking.bend = slower(braking.bend, STOP_SHARE * jerk, *qd);
+            ramp.slower = slower(ramp.slower, (acceleration + own).max(0.0), *qd);
+            ramp.faster = slower(ramp.faster, (acceleration - own).max(0.0), *qd);
+            ramp.bend = slower(ramp.bend, share * jerk, *qd);
         }
     }
 }

@@ -1,32 +1,53 @@
-//! The clock of a trajectory: runs with the samples, or is braked to a stop on the path.
+//! The clock of a trajectory: runs with the samples, slower than they do, or not at all. Whatever it does, the arm stays on its
+//! path.
 
 use super::Rates;
-use super::torque_budget::Braking;
-use crate::mechanics::math::sqrt;
+use super::torque_budget::Ramp;
+use crate::mechanics::math::{clamp, sqrt};
 
 /// Trajectory time in whole samples plus a fraction, so that long moves keep their resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
     ticks: u32,
     fraction: f32,
-    /// Time scale: 1 in motion, 0 when stopped.
+    /// Time scale: 1 at full pace, 0 when stopped.
     time_scale: f32,
-    /// Change of the time scale, 1/s; never positive.
+    /// Change of the time scale, 1/s.
     slope: f32,
-}
-
-impl Default for Clock {
-    fn default() -> Self {
-        Self {
-            ticks: 0,
-            fraction: 0.0,
-            time_scale: 1.0,
-            slope: 0.0,
-        }
-    }
+    /// Where the time scale is to go.
+    pace: f32,
 }
 
 impl Clock {
+    /// At the beginning of a trajectory, where the arm is at rest and any time scale is as good as another.
+    pub fn new(pace: f32) -> Self {
+        Self {
+            ticks: 0,
+            fraction: 0.0,
+            time_scale: pace,
+            slope: 0.0,
+            pace,
+        }
+    }
+
+    /// Where the time scale is to go from now on, 0 to 1.
+    pub fn set_pace(&mut self, pace: f32) {
+        self.pace = pace;
+        if self.ticks == 0 && self.fraction <= 0.0 {
+            *self = Self::new(pace);
+        }
+    }
+
+    /// Whether the time scale stays as it is.
+    pub fn is_even(&self) -> bool {
+        self.time_scale == self.pace && self.slope == 0.0
+    }
+
+    /// Whether time passes as it was planned.
+    pub fn is_full(&self) -> bool {
+        self.is_even() && self.time_scale == 1.0
+    }
+
     /// Time on the trajectory, s.
     pub fn time(&self, period: f32) -> f32 {
         (self.ticks as f32 + self.fraction) * period
@@ -44,26 +65,43 @@ impl Clock {
 
     /// Advances by one sample.
     pub fn advance(&mut self, period: f32) {
-        let step = self.time_scale + 0.5 * self.slope * period;
-        self.time_scale = (self.time_scale + self.slope * period).max(0.0);
-        self.fraction += step.max(0.0);
+        let before = self.time_scale;
+        self.time_scale = clamp(before + self.slope * period, 0.0, 1.0);
+        // There, or past it.
+        if (before - self.pace) * (self.time_scale - self.pace) <= 0.0 && self.slope != 0.0 {
+            self.time_scale = self.pace;
+            self.slope = 0.0;
+        }
+        self.fraction += 0.5 * (before + self.time_scale);
         if self.fraction >= 1.0 {
             self.fraction -= 1.0;
             self.ticks = self.ticks.saturating_add(1);
         }
     }
 
-    /// Chooses the next slope of a stop: as steep as the torque allows, no sooner than it can be built up, and flattening
-    /// towards rest. The arm stays on its path.
-    pub fn brake(&mut self, Braking { slope, bend }: Braking, period: f32) {
+    /// Chooses the next slope towards the pace: as steep as the torque allows, no sooner than it can be built up, and flattening
+    /// towards the pace.
+    pub fn ramp(&mut self, ramp: &Ramp, period: f32) {
+        let Ramp {
+            slower,
+            faster,
+            bend,
+        } = *ramp;
         if !bend.is_finite() {
-            // At rest on the trajectory: nothing to brake.
-            self.time_scale = 0.0;
+            // At rest on the trajectory, where any time scale is as good as another.
+            self.time_scale = self.pace;
             self.slope = 0.0;
             return;
         }
-        let flare = sqrt(2.0 * bend * self.time_scale);
-        self.slope = -(bend * period - self.slope).min(slope).min(flare);
+        let left = self.pace - self.time_scale;
+        let (toward, flare) = if left < 0.0 {
+            (-self.slope, sqrt(-2.0 * bend * left))
+        } else {
+            (self.slope, sqrt(2.0 * bend * left))
+        };
+        let toward = (toward + bend * period).min(flare);
+        let slope = if left < 0.0 { -toward } else { toward };
+        self.slope = clamp(slope, -slower, faster);
     }
 
     /// The velocities and accelerations of the trajectory as the clock runs through them, `later` seconds from now.

@@ -7,11 +7,18 @@ use protocol::messages::{Refusal, RefusalReason};
 use super::clock::Clock;
 use super::planner::Planner;
 use super::request::Request;
-use super::torque_budget::TorqueBudget;
+use super::torque_budget::{RAMP_SHARE, STOP_SHARE, TorqueBudget};
 use super::{Rates, Reference, Setpoint, Trajectory};
+use crate::mechanics::math::sqrt;
 
 /// Capacity for requests, and as many planned moves.
 pub const CAPACITY: usize = 4;
+
+/// Least pace to which moves are slowed down for want of torque. An arm that needs more has met something; that it stands off
+/// its path must not come out much later.
+const LEAST_PACE: f32 = 0.5;
+/// Share of the torque that moves are slowed down to.
+const EASED: f32 = 0.97;
 
 /// Result of [`MoveQueue::advance`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +31,7 @@ pub enum Progress {
 
 /// How far the motion goes on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
+pub struct Stride {
     /// Samples since the last reference.
     pub steps: u32,
     /// Sampling period, s.
@@ -43,6 +50,10 @@ pub struct MoveQueue {
     moves: Deque<Trajectory, CAPACITY>,
     /// Runs along the first of `moves`.
     clock: Clock,
+    /// Pace that the operator has asked for.
+    asked: f32,
+    /// Pace at which the torque was found to suffice.
+    found: f32,
     /// Where the last planned move ends: the next one starts there.
     plan_end: Vector4<f32>,
     completed: u8,
@@ -55,7 +66,9 @@ impl MoveQueue {
             requests: Deque::new(),
             planner: Planner::new(),
             moves: Deque::new(),
-            clock: Clock::default(),
+            clock: Clock::new(1.0),
+            asked: 1.0,
+            found: 1.0,
             plan_end: Vector4::zeros(),
             completed: 0,
         }
@@ -87,6 +100,48 @@ impl MoveQueue {
         self.completed
     }
 
+    /// Share of its planned speed at which a move passes, once it has got there.
+    pub fn pace(&self) -> f32 {
+        self.asked.min(self.found)
+    }
+
+    /// Share of its planned speed at which the move under way passes, or the next one will begin.
+    pub fn pace_now(&self) -> f32 {
+        if self.is_ready() {
+            self.clock.time_scale()
+        } else {
+            self.pace()
+        }
+    }
+
+    /// Speed override, 0 to 1. What was found before is forgotten.
+    pub fn set_pace(&mut self, pace: f32) {
+        self.asked = pace;
+        self.try_full_pace();
+    }
+
+    /// Forgets the pace at which the torque was found to suffice: for another payload, say.
+    pub fn try_full_pace(&mut self) {
+        self.found = 1.0;
+        self.clock.set_pace(self.asked);
+    }
+
+    /// Slows down for want of torque, of which the move needs `excess` times as much as there is. `now` where that helps: an arm that
+    /// brakes would need more torque for it, so that only the moves after this one can be slower.
+    pub fn ease(&mut self, excess: f32, now: bool) {
+        // Nearly all torque that a motion needs goes with the square of its pace.
+        let pace = self.clock.time_scale() * sqrt(EASED / excess);
+        self.found = self.found.min(pace.max(LEAST_PACE));
+        if now {
+            self.clock.set_pace(self.pace());
+        }
+    }
+
+    /// Whether the pace is changing, which makes a sample expensive.
+    pub fn is_ramping(&self) -> bool {
+        self.is_ready() && !self.clock.is_even()
+    }
+
     /// Takes a request.
     ///
     /// # Errors
@@ -107,7 +162,7 @@ impl MoveQueue {
     /// Drops all planned moves; the next one starts at `q`.
     pub fn clear(&mut self, q: &Vector4<f32>) {
         self.moves.clear();
-        self.clock = Clock::default();
+        self.clock = Clock::new(self.pace());
         self.plan_end = *q;
     }
 
@@ -143,15 +198,15 @@ impl MoveQueue {
     pub fn advance(
         &mut self,
         budget: &TorqueBudget<'_>,
-        pace: &Pace,
+        stride: &Stride,
         setpoint: &mut Setpoint,
     ) -> Progress {
-        let Pace {
+        let Stride {
             steps,
             period,
             lead,
             stopping,
-        } = *pace;
+        } = *stride;
         let here = setpoint.reference.q;
         let Some(trajectory) = self.moves.front() else {
             *setpoint = Setpoint::rest(here);
@@ -161,41 +216,56 @@ impl MoveQueue {
             self.clock.advance(period);
         }
         let t = self.clock.time(period);
-        let ended = t >= trajectory.duration();
+        let (sequence, ended) = (trajectory.sequence, t >= trajectory.duration());
         let ahead = self.clock.lead(lead);
         if trajectory.follow(budget.arm, t, ahead, setpoint).is_err() {
             // A verified path stays in reach; should arithmetic disagree, the arm holds.
             *setpoint = Setpoint::rest(here);
         }
         if stopping {
+            self.clock.set_pace(0.0);
+        }
+        if !self.clock.is_even() {
+            self.ramp(budget, stride, setpoint);
+        }
+        if stopping && (ended || self.clock.is_stopped()) {
+            *setpoint = Setpoint::rest(setpoint.reference.q);
+            return Progress::Arrived;
+        }
+        if !self.clock.is_full() {
             let Reference { q, qd, qdd } = setpoint.reference;
-            // The torque is that of the instant in which the command acts.
-            let then = Reference {
-                q,
-                qd: setpoint.ahead.qd,
-                qdd: setpoint.ahead.qdd,
-            };
-            let braking = budget.braking(&then, self.clock.time_scale());
-            self.clock.brake(braking, period);
-            if ended || self.clock.is_stopped() {
-                *setpoint = Setpoint::rest(q);
-                return Progress::Arrived;
-            }
             let Rates { qd, qdd } = self.clock.apply(&Rates { qd, qdd }, 0.0);
             setpoint.reference = Reference { q, qd, qdd };
             setpoint.ahead = self.clock.apply(&setpoint.ahead, lead);
-            return Progress::UnderWay;
         }
         if ended {
-            self.completed = trajectory.sequence;
+            self.completed = sequence;
             self.moves.pop_front();
-            self.clock = Clock::default();
+            self.clock = Clock::new(self.pace());
         }
         if self.moves.is_empty() {
             Progress::Arrived
         } else {
             Progress::UnderWay
         }
+    }
+
+    /// The next change of the pace.
+    #[inline(never)]
+    fn ramp(&mut self, budget: &TorqueBudget<'_>, stride: &Stride, setpoint: &Setpoint) {
+        // The torque is that of the instant in which the command acts.
+        let then = Reference {
+            q: setpoint.reference.q,
+            qd: setpoint.ahead.qd,
+            qdd: setpoint.ahead.qdd,
+        };
+        let soon = stride.stopping || self.found < self.asked;
+        let share = if soon { STOP_SHARE } else { RAMP_SHARE };
+        let mut ramp = budget.ramp(&then, self.clock.time_scale(), share);
+        if stride.stopping {
+            ramp.faster = 0.0;
+        }
+        self.clock.ramp(&ramp, stride.period);
     }
 }
 

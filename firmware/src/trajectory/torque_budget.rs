@@ -21,6 +21,8 @@ const RATE_SHARE: f32 = 0.95;
 const VERIFIED_RATE: f32 = 0.955;
 /// Share of the torque's rate of change that a stop may use: the move's own change keeps the rest.
 pub(super) const STOP_SHARE: f32 = 0.5;
+/// The same for another pace, which nobody needs at once: what a plan leaves.
+pub(super) const RAMP_SHARE: f32 = 0.05;
 
 /// The limits of one arm with one payload, as the planner uses them.
 #[derive(Clone, Copy, Debug)]
@@ -40,11 +42,13 @@ pub struct Need {
     rest: Torques,
 }
 
-/// How fast a trajectory may be stopped on its path.
+/// How fast a trajectory may change its time scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Braking {
-    /// Greatest change of the time scale, 1/s.
-    pub slope: f32,
+pub struct Ramp {
+    /// Greatest decrease of the time scale, 1/s.
+    pub slower: f32,
+    /// Greatest increase, 1/s.
+    pub faster: f32,
     /// Greatest change of the slope, 1/s²; infinite at rest.
     pub bend: f32,
 }
@@ -83,24 +87,29 @@ impl TorqueBudget<'_> {
         })
     }
 
-    /// How fast the clock that runs through a trajectory at `time_scale` may be braked before the first torque reaches
-    /// its share. `reference` is the trajectory's own. With a load on the lift the two directions differ: its
-    /// weight brakes a rise, and takes most of the force on the way down.
-    pub fn braking(&self, reference: &Reference, time_scale: f32) -> Braking {
+    /// How fast the clock that runs through a trajectory at `time_scale` may be braked or sped up before the first torque reaches
+    /// its share, with this share of the torques' rates. `reference` is the trajectory's own. With a load on the lift the two
+    /// directions differ: its weight brakes a rise, and takes most of the force on the way down.
+    pub fn ramp(&self, reference: &Reference, time_scale: f32, share: f32) -> Ramp {
         let rest = Reference {
             q: reference.q,
             qd: reference.qd * time_scale,
             qdd: reference.qdd * (time_scale * time_scale),
         };
-        let need = self.split(&rest, &-reference.qd);
-        let mut braking = Braking {
-            slope: self.room(&need, 0.0).max(0.0),
-            bend: STOP_SHARE * self.quickest(&need),
+        let braking = self.split(&rest, &-reference.qd);
+        let speeding = Need {
+            push: -braking.push,
+            rest: braking.rest,
+        };
+        let mut ramp = Ramp {
+            slower: self.room(&braking, 0.0).max(0.0),
+            faster: self.room(&speeding, 0.0).max(0.0),
+            bend: share * self.quickest(&braking),
         };
         if self.arm.limits.caps_acceleration() {
-            self.cap_braking(&rest, &reference.qd, &mut braking);
+            self.cap_ramp(&rest, &reference.qd, share, &mut ramp);
         }
-        braking
+        ramp
     }
 
     /// The torques for the motion `rest`, and for the accelerations `push` apart from it.

@@ -55,6 +55,8 @@ pub struct Operator {
     given_up: bool,
     encoder: Encoder,
     sequence: u8,
+    /// Number of the request whose answer the program waits for.
+    awaited: u8,
     reply: Option<Outcome>,
     greeted: Option<Hello>,
     state: Option<State>,
@@ -64,8 +66,10 @@ pub struct Operator {
     heard: Instant,
     /// Sequence number of the last accepted move.
     last_move: Option<u8>,
-    /// Speed of the slowest move since the arm last arrived.
+    /// Speed of the slowest move since the arm last arrived, the override included.
     slowest: f32,
+    /// Speed override.
+    pace: f32,
 }
 
 impl Operator {
@@ -81,6 +85,7 @@ impl Operator {
             given_up: false,
             encoder: Encoder::default(),
             sequence: 0,
+            awaited: 0,
             reply: None,
             greeted: None,
             state: None,
@@ -88,6 +93,7 @@ impl Operator {
             heard: Instant::ORIGIN,
             last_move: None,
             slowest: 1.0,
+            pace: 1.0,
         }
     }
 
@@ -105,7 +111,7 @@ impl Operator {
             return;
         };
         match received.message {
-            Message::MotionReply(reply) if reply.sequence == self.sequence => {
+            Message::MotionReply(reply) if reply.sequence == self.awaited => {
                 self.reply = Some(reply.outcome);
             }
             Message::ParameterReply(Server::Controller, ParameterReply::Hello(hello)) => {
@@ -208,11 +214,9 @@ impl Operator {
             }
             Action::Request(request) => {
                 self.reply = None;
-                self.sequence = self.sequence.wrapping_add(1);
-                Message::Motion(Motion {
-                    sequence: self.sequence,
-                    request: *request,
-                })
+                let frame = self.send(*request);
+                self.awaited = self.sequence;
+                return frame;
             }
             Action::EmergencyStop => Message::EStop(EStop {
                 reason: EStopReason::BUTTON,
@@ -221,6 +225,17 @@ impl Operator {
             _ => return None,
         };
         // A value that no frame can carry is not sent; the error of the missing reply then names the request.
+        self.encoder.encode(&message).ok()
+    }
+
+    /// A request whose answer the program does not wait for.
+    fn send(&mut self, request: MotionRequest) -> Option<CanFrame> {
+        if let MotionRequest::SetOverride { pace } = request {
+            self.pace = pace;
+        }
+        self.sequence = self.sequence.wrapping_add(1);
+        let sequence = self.sequence;
+        let message = Message::Motion(Motion { sequence, request });
         self.encoder.encode(&message).ok()
     }
 
@@ -257,9 +272,9 @@ impl Operator {
                         });
                     }
                     Some(Outcome::Accepted) if request.is_move() => {
-                        self.last_move = Some(self.sequence);
+                        self.last_move = Some(self.awaited);
                     }
-                    None => self.slowest = self.slowest.min(speed_of(request)),
+                    None => self.slowest = self.slowest.min(self.pace * speed_of(request)),
                     _ if *request == MotionRequest::Stop => {
                         // The current move will never complete.
                         self.last_move = None;
@@ -287,7 +302,7 @@ impl Operator {
                 });
                 let limit = self.move_limit();
                 if arrived {
-                    self.slowest = 1.0;
+                    self.slowest = self.pace;
                 }
                 (arrived, limit)
             }
@@ -319,7 +334,7 @@ impl Operator {
         match action {
             Action::Hello => "reply to hello".into(),
             Action::Request(request) => {
-                format!("reply to request {} ({})", self.sequence, request.name())
+                format!("reply to request {} ({})", self.awaited, request.name())
             }
             Action::WaitMode(mode) => format!("state {mode}"),
             Action::WaitArrived => "end of the move".into(),

@@ -143,6 +143,14 @@ pub fn of_run(scenario: &Scenario, robot: &RobotModel) -> Vec<Group> {
             ],
         },
         moves(scenario, robot),
+        Group {
+            title: "Speed override",
+            hint: Some(
+                "Also of a move under way, which stays on its path. At 0 the arm waits there.",
+            ),
+            fields: vec![number("pace", "Override", [0.0, 100.0], 1.0, 100.0, "%")],
+            buttons: vec![button("Set", "override", &["pace"])],
+        },
         jog(),
         Group {
             title: "Payload and law",

@@ -51,6 +51,10 @@ pub(super) enum Asked {
         sign: f64,
         speed: f64,
     },
+    /// Speed override.
+    Override {
+        pace: f64,
+    },
     Payload {
         mass: f64,
     },
@@ -110,6 +114,7 @@ impl Asked {
                 posture: Posture::NEAREST,
             }),
             Self::Jog { .. } => Err("a jog begins where the arm is".into()),
+            Self::Override { pace } => request(MotionRequest::SetOverride { pace: share(*pace) }),
             Self::Payload { mass } => Ok(Wish::Order(Order::Carry(PayloadSpec::compact(*mass)))),
             Self::Law { law } => request(MotionRequest::SelectLaw {
                 law: law.law,

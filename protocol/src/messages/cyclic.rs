@@ -103,6 +103,9 @@ pub struct State {
     pub fault_value: f32,
     /// Limit, in the same unit; 0 if the cause has none.
     pub fault_limit: f32,
+    /// Share of its planned speed at which a move passes or would pass now, %: less than 100 with a speed override, and where the
+    /// controller has slowed down by itself.
+    pub pace: u8,
 }
 
 impl State {

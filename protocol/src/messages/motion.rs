@@ -82,6 +82,11 @@ pub enum MotionRequest {
         /// Bandwidth of the disturbance observer, rad/s.
         observer: f32,
     },
+    /// Speed override: at which pace every move passes from now on, under way or not.
+    SetOverride {
+        /// Share of the speed that each move was planned with, 0 to 1; 0 holds the arm on its path until it is raised again.
+        pace: f32,
+    },
 }
 
 impl MotionRequest {
@@ -97,6 +102,7 @@ impl MotionRequest {
         (7, "set-payload"),
         (8, "select-law"),
         (9, "set-gains"),
+        (10, "set-override"),
     ];
 
     /// Name, lower case with hyphens.
@@ -113,6 +119,7 @@ impl MotionRequest {
             Self::SetPayload { .. } => "set-payload",
             Self::SelectLaw { .. } => "select-law",
             Self::SetGains { .. } => "set-gains",
+            Self::SetOverride { .. } => "set-override",
         }
     }
 

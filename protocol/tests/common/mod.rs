@@ -124,6 +124,7 @@ fn request() -> impl Strategy<Value = MotionRequest> {
                 observer
             }
         ),
+        (0.0..=1.0f32).prop_map(|pace| R::SetOverride { pace }),
     ]
 }
 
@@ -138,7 +139,7 @@ fn state() -> impl Strategy<Value = Message> {
         any::<(u8, u8, u16, u16, u32)>(),
         (select(Law::ALL), select(Compensation::ALL)),
         uniform4(any_f32()),
-        (select(FaultAxis::ALL), any_f32(), any_f32()),
+        (select(FaultAxis::ALL), any_f32(), any_f32(), any::<u8>()),
     )
         .prop_map(|(status, counts, selected, tracking_error, fault)| {
             Message::State(State {
@@ -156,6 +157,7 @@ fn state() -> impl Strategy<Value = Message> {
                 fault_axis: fault.0,
                 fault_value: fault.1,
                 fault_limit: fault.2,
+                pace: fault.3,
             })
         })
 }

@@ -121,6 +121,7 @@ fn state() {
             fault_axis: FaultAxis::None,
             fault_value: 0.0,
             fault_limit: 0.0,
+            pace: 0,
         }),
         128,
         "300##1090B003803090201FFFF1098020004010000003F000080BE0000003E000080BF000000000000000000\
@@ -147,6 +148,7 @@ fn state_with_a_fault() {
             fault_axis: FaultAxis::Lift,
             fault_value: 0.0021,
             fault_limit: 0.002,
+            pace: 100,
         }),
         129,
         "300##1080B04200007010002000000000004020000003F000080BE27A0093B000080BF0327A0093B6F12033\

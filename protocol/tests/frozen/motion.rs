@@ -140,6 +140,19 @@ fn law() {
 }
 
 #[test]
+fn speed_override() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::SetOverride { pace: 0.25 },
+        }),
+        5,
+        "2C0##1090A0000803E0000000000000000000000000000000000000000000000000000000000000000000000\
+        0000000005",
+    );
+}
+
+#[test]
 fn gains() {
     check(
         Message::Motion(Motion {

@@ -5,7 +5,7 @@ use protocol::messages::{Outcome, Refusal, RefusalReason};
 use super::Controller;
 use crate::control::states::{Event, State};
 use crate::trajectory::Setpoint;
-use crate::trajectory::queue::{Pace, Progress};
+use crate::trajectory::queue::{Progress, Stride};
 use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Controller {
@@ -22,8 +22,9 @@ impl Controller {
     /// Continues planning: one step per millisecond of the sampling period, at least one. Kept out of the path from
     /// measurement to command, which it would delay. Returns whether there was anything to plan.
     pub fn plan(&mut self) -> bool {
-        // Where a stop will end is not known before; and a sample that brakes has no time to plan.
-        if !self.state.is_powered() || self.state.is_stopping() || !self.queue.has_to_plan() {
+        // Where a stop will end is not known before; and a sample that changes the pace has no time to plan.
+        let busy = self.state.is_stopping() || self.queue.is_ramping();
+        if !self.state.is_powered() || busy || !self.queue.has_to_plan() {
             return false;
         }
         let budget = TorqueBudget {
@@ -58,13 +59,13 @@ impl Controller {
             arm: &self.config.arm,
             body: &self.body,
         };
-        let pace = Pace {
+        let stride = Stride {
             steps,
             period: self.config.period.seconds(),
             lead,
             stopping,
         };
-        match self.queue.advance(&budget, &pace, &mut self.setpoint) {
+        match self.queue.advance(&budget, &stride, &mut self.setpoint) {
             Progress::UnderWay => {}
             Progress::Arrived if stopping => {
                 self.queue.clear(&self.setpoint.reference.q);

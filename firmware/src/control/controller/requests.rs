@@ -65,6 +65,10 @@ impl Controller {
                 };
                 self.enqueue(sequence, target, *speed)?
             }
+            MotionRequest::SetOverride { pace } => {
+                self.queue.set_pace(*pace);
+                Answer::Now
+            }
             _ if !self.is_idle() => return Err(Refusal::because(RefusalReason::Moving)),
             MotionRequest::SetPayload { mass, com, inertia } => {
                 let payload = Payload {
@@ -120,6 +124,7 @@ impl Controller {
     #[inline(never)]
     pub(super) fn forget(&mut self) {
         self.memory = Memory::new();
+        self.queue.try_full_pace();
     }
 
     /// Whether law, gains and model may change: nothing moves or is about to, and no fault is latched.

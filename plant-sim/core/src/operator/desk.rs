@@ -7,7 +7,7 @@ use protocol::frame::CanFrame;
 use protocol::messages::{Message, Mode, MotionRequest, Outcome};
 use protocol::time::Instant;
 
-use super::program::{Action, Program, announce};
+use super::program::{Action, Program, announcement};
 use super::{Operator, Progress, SILENCE_LIMIT};
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::refusal::sentence;
@@ -91,8 +91,8 @@ impl Desk {
         }
     }
 
-    /// Asks for something. Whatever it is, the scenario does not go on by itself after it; moves that the controller has
-    /// accepted do.
+    /// Asks for something. Unless it is another speed, the scenario does not go on by itself after it; moves that the controller
+    /// has accepted do.
     pub fn order(&mut self, order: Order) {
         self.orders.push_back(order);
     }
@@ -111,33 +111,36 @@ impl Desk {
         self.answers.push(Answer { at, text, good });
     }
 
-    /// Executes an order.
+    /// Executes an order. A scenario goes on only with another speed.
     fn obey(&mut self, now: Instant, order: Order, out: &mut Outbox) {
-        self.scripted = false;
-        let (action, carry) = match order {
-            Order::Request(request) => (Action::Request(request), None),
-            Order::Carry(payload) => (announce(&payload), Some(payload)),
-            Order::EmergencyStop => (Action::EmergencyStop, None),
-            Order::Scenario => return self.again(now),
+        let (request, carry) = match order {
+            Order::Request(request) => (request, None),
+            Order::Carry(payload) => (announcement(&payload), Some(payload)),
+            Order::EmergencyStop => {
+                self.scripted = false;
+                let frame = self.operator.begin(&Action::EmergencyStop);
+                out.extend(frame.map(|frame| (now, frame)));
+                return self.answer(now, true, format!("{}: sent", order.name()));
+            }
+            Order::Scenario => {
+                self.scripted = false;
+                return self.again(now);
+            }
         };
-        let Some(frame) = self.operator.begin(&action) else {
+        self.scripted &= matches!(request, MotionRequest::SetOverride { .. });
+        let Some(frame) = self.operator.send(request) else {
             let text = format!("{}: a value that no frame can carry", order.name());
             return self.answer(now, false, text);
         };
         out.push((now, frame));
-        match action {
-            Action::Request(request) => {
-                if self.open.len() == OPEN {
-                    self.open.pop_front();
-                }
-                self.open.push_back(Open {
-                    sequence: self.operator.sequence,
-                    request,
-                    carry,
-                });
-            }
-            _ => self.answer(now, true, format!("{}: sent", order.name())),
+        if self.open.len() == OPEN {
+            self.open.pop_front();
         }
+        self.open.push_back(Open {
+            sequence: self.operator.sequence,
+            request,
+            carry,
+        });
     }
 
     /// Begins the scenario again, from where the controller is.
@@ -235,7 +238,7 @@ impl Operator {
         self.given_up = false;
         self.alarmed = false;
         self.last_move = None;
-        self.slowest = 1.0;
+        self.slowest = self.pace;
     }
 }
 

@@ -6,7 +6,7 @@ use protocol::messages::{Mode, MotionRequest};
 use protocol::time::Duration;
 
 use super::CellEvent;
-use crate::scenario::{PayloadSpec, Scenario, Source, Step};
+use crate::scenario::{Override, PayloadSpec, Scenario, Source, Step};
 use crate::world::Spot;
 
 /// Wait after enabling, until brake and observer have settled.
@@ -156,6 +156,10 @@ impl Program {
                 Action::Dwell(Duration::from_seconds(*seconds)),
                 Action::Request(MotionRequest::Stop),
             ],
+            Step::Override(Override { after, to }) => vec![
+                Action::Dwell(Duration::from_seconds(*after)),
+                Action::Request(MotionRequest::SetOverride { pace: *to as f32 }),
+            ],
             Step::Estop(seconds) => vec![
                 Action::Dwell(Duration::from_seconds(*seconds)),
                 Action::EmergencyStop,
@@ -239,12 +243,16 @@ impl Iterator for Program {
     }
 }
 
-pub(super) fn announce(payload: &PayloadSpec) -> Action {
-    Action::Request(MotionRequest::SetPayload {
+fn announce(payload: &PayloadSpec) -> Action {
+    Action::Request(announcement(payload))
+}
+
+pub(super) fn announcement(payload: &PayloadSpec) -> MotionRequest {
+    MotionRequest::SetPayload {
         mass: payload.mass as f32,
         com: payload.com_flange_frame.map(|x| x as f32),
         inertia: payload.inertia_com_diag.map(|x| x as f32),
-    })
+    }
 }
 
 #[cfg(test)]

@@ -10,8 +10,8 @@ use protocol::time::Duration;
 use toml::de::{DeTable, DeValue};
 
 use super::{
-    GainsSpec, Joints, Jump, Line, MAX_CYCLES, PayloadSpec, Place, Scenario, ScenarioError, Step,
-    check_rate,
+    GainsSpec, Joints, Jump, Line, MAX_CYCLES, Override, PayloadSpec, Place, Scenario,
+    ScenarioError, Step, check_rate,
 };
 use crate::allowed::schema::Each;
 use crate::allowed::{
@@ -32,6 +32,7 @@ pub(super) const RATE: Allowed = Allowed::within(100.0, 10_000.0, "Hz");
 pub(super) const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
 /// At a ten-thousandth a move takes hours; slower ones are meant otherwise.
 pub(super) const SPEED: Allowed = Allowed::within(1e-4, 1.0, "of full speed");
+pub(super) const PACE: Allowed = Allowed::within(0.0, 1.0, "of the planned speed");
 pub(super) const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
 /// A limit of a requirement, in whatever unit.
 pub(super) const AMOUNT: Allowed = Allowed::within(0.0, 1e9, "");
@@ -69,6 +70,8 @@ impl Scenario {
             findings.wrong("cycle", "empty", "at least one step");
         }
         let mut moves = false;
+        // The step that holds the arm.
+        let mut held = None;
         for (index, step) in self.cycle.iter().enumerate() {
             let key = format!("cycle[{index}]");
             findings.step(&key, step);
@@ -80,7 +83,17 @@ impl Scenario {
                 );
             }
             moves |= matches!(step, Step::Jump(_) | Step::Line(_) | Step::Joints(_));
+            match step {
+                Step::Override(Override { to, .. }) => held = (*to == 0.0).then_some(key),
+                // These wait for an arm that has to arrive.
+                Step::Dwell(_) | Step::Pick(_) | Step::Place {} => {
+                    findings.held(held.take());
+                }
+                Step::Stop(_) | Step::Estop(_) => held = None,
+                Step::Jump(_) | Step::Line(_) | Step::Joints(_) => {}
+            }
         }
+        findings.held(held);
         findings.requirements();
         findings.judge()
     }
@@ -241,6 +254,10 @@ impl<'a> Findings<'a> {
             }
             Step::Dwell(seconds) => self.number(&format!("{key}.dwell"), *seconds, SECONDS),
             Step::Stop(seconds) => self.number(&format!("{key}.stop"), *seconds, SECONDS),
+            Step::Override(Override { after, to }) => {
+                self.number(&format!("{key}.override.after"), *after, SECONDS);
+                self.number(&format!("{key}.override.to"), *to, PACE);
+            }
             Step::Estop(seconds) => self.number(&format!("{key}.estop"), *seconds, SECONDS),
             Step::Pick(payload) => {
                 let key = format!("{key}.pick");
@@ -250,6 +267,17 @@ impl<'a> Findings<'a> {
                 self.payload(&key, payload);
             }
             Step::Place {} => {}
+        }
+    }
+
+    /// An arm that is held never arrives.
+    fn held(&mut self, key: Option<String>) {
+        if let Some(key) = key {
+            self.wrong(
+                &format!("{key}.override.to"),
+                0.0,
+                "followed by an override above 0 before the next step that waits for the arm, or the end of the cycle",
+            );
         }
     }
 

@@ -23,6 +23,8 @@ pub enum Step {
     Dwell(#[schemars(transform = by(check::SECONDS))] f64),
     /// This many seconds after the last move was accepted, stop on the path.
     Stop(#[schemars(transform = by(check::SECONDS))] f64),
+    /// Some seconds after the last move was accepted, set the speed override.
+    Override(Override),
     /// This many seconds after the last move was accepted, press the emergency stop.
     Estop(#[schemars(transform = by(check::SECONDS))] f64),
     /// Take a payload and announce it.
@@ -40,6 +42,7 @@ impl Step {
             Self::Joints(_) => "joints",
             Self::Dwell(_) => "dwell",
             Self::Stop(_) => "stop",
+            Self::Override(_) => "override",
             Self::Estop(_) => "estop",
             Self::Pick(_) => "pick",
             Self::Place {} => "place",
@@ -127,6 +130,18 @@ pub struct Joints {
     #[serde(default = "full")]
     #[schemars(transform = by(check::SPEED))]
     pub speed: f64,
+}
+
+/// A change of the speed override: of the pace at which every move passes from then on, the one under way included.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Override {
+    /// Seconds after the last move was accepted.
+    #[schemars(transform = by(check::SECONDS))]
+    pub after: f64,
+    /// Share of the speed that moves are planned with; 0 holds the arm on its path, until another step of the same cycle raises it.
+    #[schemars(transform = by(check::PACE))]
+    pub to: f64,
 }
 
 impl Jump {
