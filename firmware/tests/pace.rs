@@ -98,10 +98,11 @@ fn check(
         return Ok(());
     };
     let planned = plan(arm, payload, from, target, speed).unwrap();
-    let most = (0..=800).fold(TORQUE_SHARE + 0.01, |most, sample| {
+    // A hundredth for what lies between two samples, as where a joint of a line turns back.
+    let most = (0..=800).fold(TORQUE_SHARE, |most, sample| {
         let t = planned.duration() * sample as f32 / 800.0;
         need(arm, &body, payload, &planned.at(arm, t).unwrap()).max(most)
-    }) + 1e-3;
+    }) + 0.01;
     let mut before = Reference::rest(*from);
     let mut at = 0.0;
     for sample in 0.. {

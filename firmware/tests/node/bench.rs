@@ -6,13 +6,14 @@ use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
 use firmware::mechanics::dynamics::drive::Drive;
 use firmware::node::{Node, PEER_TIMEOUT};
+use firmware::trajectory::Reference;
 use nalgebra::Vector4;
 use protocol::bus::{Transmit, TransmitError};
 use protocol::codec::{decode, encode};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Command, ControlWord, DriveStatus, EStop, EStopReason, Feedback, Hello, Message, Mode, Motion,
-    MotionRequest, Outcome, ParameterRequest, RefusalReason, ResetReason, Server,
+    Command, Compensation, ControlWord, DriveStatus, EStop, EStopReason, Feedback, Hello, Message,
+    Mode, Motion, MotionRequest, Outcome, ParameterRequest, RefusalReason, ResetReason, Server,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
@@ -108,7 +109,11 @@ impl Bench {
 
     /// A bench in the middle of a fast move.
     pub(crate) fn moving() -> Self {
-        let mut bench = Self::enabled();
+        let mut config = Config::new(IRB_930, PERIOD);
+        // These drives report no torque: what an observer would make of that is no motion.
+        config.setup.selection.compensation = Compensation::None;
+        let mut bench = Self::with(config);
+        bench.enable();
         bench.follows = true;
         let target = [-1.0, 0.5, 0.05, -2.0];
         let frame = bench.motion(MotionRequest::MoveJoint { target, speed: 1.0 });
@@ -130,9 +135,12 @@ impl Bench {
 
     pub(crate) fn next_feedback(&mut self) -> CanFrame {
         if self.follows {
-            let reference = *self.node.controller().reference();
-            self.put(&reference.q);
-            self.velocity = self.drive.motor_angle(&reference.qd).into();
+            // Where the reference will be at this sample, by its last velocity and acceleration.
+            let Reference { q, qd, qdd } = *self.node.controller().reference();
+            let period = self.period.seconds() as f32;
+            let mean = qd + qdd * (0.5 * period);
+            self.put(&(q + mean * period));
+            self.velocity = self.drive.motor_angle(&mean).into();
         }
         let word = self.node.controller().control_word();
         let is_on = self.obeys && word.contains(ControlWord::TORQUE_ENABLE);

@@ -148,7 +148,7 @@ fn state_with_a_fault() {
             fault_axis: FaultAxis::Lift,
             fault_value: 0.0021,
             fault_limit: 0.002,
-            pace: 100,
+            pace: 0,
         }),
         129,
         "300##1080B04200007010002000000000004020000003F000080BE27A0093B000080BF0327A0093B6F12033\
