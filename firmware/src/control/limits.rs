@@ -30,6 +30,21 @@ const TORQUE: [LimitFlags; 4] = [
 
 /// Cuts joint torques (N m, lift N) to the limits of the joints, then of the motors.
 pub fn cut(arm: &ArmModel, drive: &Drive, torque: &Vector4<f32>) -> Limited {
+    let motor_torque = drive.motor_torque(torque);
+    if fits(torque, &arm.limits.effort) && fits(&motor_torque, &arm.drive.motor_torque_limit) {
+        // Nearly always.
+        return Limited {
+            motor_torque,
+            excess: Vector4::zeros(),
+            flags: LimitFlags::EMPTY,
+        };
+    }
+    cut_down(arm, drive, torque)
+}
+
+// Out of line: rare in a sample.
+#[inline(never)]
+fn cut_down(arm: &ArmModel, drive: &Drive, torque: &Vector4<f32>) -> Limited {
     let joint = torque.zip_map(&arm.limits.effort, within);
     let wanted = drive.motor_torque(&joint);
     let motor_torque = wanted.zip_map(&arm.drive.motor_torque_limit, within);
@@ -46,6 +61,14 @@ pub fn cut(arm: &ArmModel, drive: &Drive, torque: &Vector4<f32>) -> Limited {
         excess,
         flags,
     }
+}
+
+/// Whether no torque exceeds its limit; NaN does.
+fn fits(torque: &Vector4<f32>, limit: &Vector4<f32>) -> bool {
+    torque
+        .iter()
+        .zip(limit.iter())
+        .all(|(torque, limit)| torque.abs() <= *limit)
 }
 
 /// `torque` cut to a magnitude; NaN stays NaN.

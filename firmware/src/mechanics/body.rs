@@ -77,20 +77,25 @@ impl Body {
 
     /// [`Body::mass_matrix`] times `qdd`, cheaper than building the matrix.
     pub fn inertial(&self, trig: &Trig, qdd: &Vector4<f32>) -> Vector4<f32> {
-        let mut torque = self.lagrange.inertial(trig, qdd);
+        self.with_rotors(self.lagrange.inertial(trig, qdd), qdd)
+    }
+
+    /// Joint torque (N m, N m, N, N m) for a motion without friction: links and rotors.
+    pub fn frictionless(&self, trig: &Trig, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
+        self.with_rotors(self.lagrange.inverse(trig, qd, qdd), qdd)
+    }
+
+    /// Joint torque (N m, N m, N, N m) for a motion: links, rotors and friction.
+    pub fn inverse(&self, trig: &Trig, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
+        self.frictionless(trig, qd, qdd) + self.drive.friction(qd)
+    }
+
+    fn with_rotors(&self, mut torque: Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
         torque.x += self.rotor.m11 * qdd.x;
         torque.y += self.rotor.m22 * qdd.y;
         torque.z += self.rotor.m33 * qdd.z + self.rotor.m34 * qdd.w;
         torque.w += self.rotor.m43 * qdd.z + self.rotor.m44 * qdd.w;
         torque
-    }
-
-    /// Joint torque (N m, N m, N, N m) for a motion: links, rotors and friction.
-    pub fn inverse(&self, trig: &Trig, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
-        self.inertial(trig, qdd)
-            + self.lagrange.bias(trig, qd)
-            + self.lagrange.gravity()
-            + self.drive.friction(qd)
     }
 }
 

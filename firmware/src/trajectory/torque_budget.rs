@@ -66,7 +66,11 @@ impl TorqueBudget<'_> {
 
     /// The acceleration along the path, 1/s², and the jerk, 1/s³, that the torques and their rates of change allow an arm at rest.
     pub fn from_rest(&self, here: &PathPoint) -> (f32, f32) {
-        let need = self.need(here, 0.0);
+        let push = self.body.inertial(&Trig::relative(&here.q), &here.dq);
+        let need = Need {
+            push: self.torques(&push),
+            rest: self.torques(&self.body.lagrange.gravity()),
+        };
         (self.room(&need, 0.0), self.quickest(&need))
     }
 
@@ -96,15 +100,12 @@ impl TorqueBudget<'_> {
             qd: reference.qd * time_scale,
             qdd: reference.qdd * (time_scale * time_scale),
         };
-        let braking = self.split(&rest, &-reference.qd);
-        let speeding = Need {
-            push: -braking.push,
-            rest: braking.rest,
-        };
+        let need = self.split(&rest, &reference.qd);
+        let (slower, faster) = self.rooms(&need);
         let mut ramp = Ramp {
-            slower: self.room(&braking, 0.0).max(0.0),
-            faster: self.room(&speeding, 0.0).max(0.0),
-            bend: share * self.quickest(&braking),
+            slower,
+            faster,
+            bend: share * self.quickest(&need),
         };
         if self.arm.limits.caps_acceleration() {
             self.cap_ramp(&rest, &reference.qd, share, &mut ramp);
@@ -127,9 +128,7 @@ impl TorqueBudget<'_> {
     #[inline(never)]
     fn load(&self, trig: &Trig, Reference { qd, qdd, .. }: &Reference) -> Torques {
         let Self { arm, body } = self;
-        let torque = body.inertial(trig, qdd)
-            + body.lagrange.bias(trig, qd)
-            + body.lagrange.gravity()
+        let torque = body.frictionless(trig, qd, qdd)
             + arm.drive.viscous.component_mul(qd)
             + body.drive.coulomb_friction(qd);
         self.torques(&torque)
@@ -151,6 +150,23 @@ impl TorqueBudget<'_> {
             }
         }
         room
+    }
+
+    /// How far `push` may go down and up from none before it and `rest` together need more than their share of a torque.
+    fn rooms(&self, need: &Need) -> (f32, f32) {
+        let limits = self.torque_limits();
+        let (mut down, mut up) = (f32::MAX, f32::MAX);
+        for ((push, rest), limit) in need.push.iter().zip(need.rest.iter()).zip(limits.iter()) {
+            let (low, high) = (limit + rest, limit - rest);
+            let (low, high) = if *push < 0.0 {
+                (high, low)
+            } else {
+                (low, high)
+            };
+            down = slower(down, low.max(0.0), *push);
+            up = slower(up, high.max(0.0), *push);
+        }
+        (down, up)
     }
 
     /// Whether the arm can creep: hold its weight and overcome friction in either direction with torque to spare.
