@@ -16,11 +16,13 @@ use sim::setup::RunConfig;
 use sim::summary::Summary;
 
 /// What spoils a scenario, and the requirements that it then misses; none where the run does not end as it should.
-const TWINS: [(&str, &[&str], &[&str]); 17] = [
+const TWINS: [(&str, &[&str], &[&str]); 19] = [
     ("gate", &["law=pid"], &["tracking", "settling"]),
     ("gate-mismatch", &["law=pd-gravity"], &["tracking"]),
     ("gate-vertical", &["cycle[0].jump.speed=0.3"], &["cycle"]),
     ("gate-22kg", &["mismatch.payload=1.3"], &["tracking"]),
+    ("heavier-load", &["law=pd-gravity"], &["tracking"]),
+    ("override", &["cycle[2].override.to=1.0"], &["pace"]),
     (
         "square",
         &["gains.bandwidth=20", "mismatch.friction=1.5"],

@@ -6,7 +6,7 @@ use std::io;
 
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{Cause, FaultAxis, Message, Node, State};
+use protocol::messages::{Cause, FaultAxis, Message, Mode, Node, State};
 use protocol::schema::Content;
 use protocol::table;
 use protocol::time::{Duration, Instant};
@@ -73,6 +73,9 @@ pub struct Summary {
     pub thermal_utilisation: [f64; 4],
     /// Peak speed over its limit, by axis, of 1.
     pub speed_utilisation: [f64; 4],
+    /// Least share of the planned speed at which the controller reported to move, of 1: less than 1 with a speed override, and
+    /// where the torque did not suffice.
+    pub pace: f64,
     /// Longest time with the motor at its limit, by axis, according to the plant, s.
     pub longest_saturation_s: [f64; 4],
     /// Share of the time for which the bus was busy, of 1.
@@ -140,6 +143,8 @@ pub struct Collector {
     faults: Vec<Fault>,
     /// The last state.
     state: Option<State>,
+    /// Least pace of a move, of 1.
+    pace: f64,
     /// Whether an emergency has arrived and no state since.
     awaits_state: bool,
     target: Option<[f64; 4]>,
@@ -157,6 +162,7 @@ impl Collector {
             judge: Judge::new(config),
             faults: Vec::new(),
             state: None,
+            pace: 1.0,
             awaits_state: false,
             target: config.cycle_target(),
             timing: BitTiming::default(),
@@ -177,6 +183,7 @@ impl Collector {
             judge,
             faults,
             state,
+            pace,
             overruns,
             ..
         } = self;
@@ -222,6 +229,7 @@ impl Collector {
             torque_utilisation: metrics.torque_utilisation(),
             thermal_utilisation: metrics.thermal_utilisation(),
             speed_utilisation: metrics.speed_utilisation(),
+            pace,
             longest_saturation_s: metrics
                 .longest_saturation
                 .map(|samples| samples as f64 / scenario.rate_hz),
@@ -281,6 +289,9 @@ impl Observer for Collector {
             // The state with the rest of the fault follows at once, unless an earlier state is still on the bus.
             Message::State(state) => {
                 self.state = Some(state);
+                if state.mode == Mode::Moving {
+                    self.pace = self.pace.min(f64::from(state.pace) / 100.0);
+                }
                 if self.awaits_state
                     && let Some(last) = self.faults.last_mut()
                     && last.cause == state.cause.name()

@@ -9,11 +9,13 @@ macro_rules! built_in {
 }
 
 /// Scenarios that come with the program: name and text.
-const BUILT_IN: [(&str, &str); 17] = built_in![
+const BUILT_IN: [(&str, &str); 19] = built_in![
     "gate",
     "gate-mismatch",
     "gate-vertical",
     "gate-22kg",
+    "heavier-load",
+    "override",
     "square",
     "pick-place",
     "palletise",

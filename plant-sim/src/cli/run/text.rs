@@ -183,6 +183,13 @@ fn load(summary: &Summary, text: &mut String) {
         "at its limit",
         saturation.map(|time| format!("{:.1} ms", time * 1e3)),
     );
+    if summary.pace < 1.0 {
+        line!(
+            text,
+            "  pace              down to {:.0} % of the planned speed: an override, or too little torque, as under a heavier load",
+            summary.pace * 100.0
+        );
+    }
 }
 
 /// End of the run.
