@@ -10,6 +10,7 @@
 mod motion;
 mod parameters;
 mod requests;
+mod strain;
 mod transitions;
 
 use heapless::Deque;
@@ -27,7 +28,7 @@ use crate::control::phase::{Phase, Probe};
 use crate::control::readings::Readings;
 use crate::control::setup::Setup;
 use crate::control::states::State;
-use crate::mechanics::arm::{ArmModel, Axis};
+use crate::mechanics::arm::ArmModel;
 use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::clamp;
@@ -39,9 +40,6 @@ use requests::Answer;
 const PLANNING_STEPS_PER_MS: f32 = 1.0;
 /// Most planning steps per sample: below 100 Hz, planning is no faster than at 100 Hz.
 const MAX_PLANNING_STEPS: f32 = 10.0;
-
-/// Share of its greatest speed below which an axis hardly moves. It passes that within milliseconds when it turns back.
-const SLOW: f32 = 0.1;
 
 /// Configuration, fixed at start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -100,6 +98,8 @@ pub struct Controller {
     fault: Fault,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
     saturated: u32,
+    /// Samples in a row in which an encoder did not move with its axis at its torque limit, those off the reference several times.
+    stuck: u32,
     /// A fault not reported to the peers yet.
     alarm: Option<Fault>,
     /// What the last sample followed, as handed to the law.
@@ -137,10 +137,11 @@ impl Controller {
             fault: Fault::NONE,
             alarm: None,
             saturated: 0,
+            stuck: 0,
             queue: MoveQueue::new(),
             setpoint: Setpoint::rest(Vector4::zeros()),
             memory: Memory::new(),
-            monitor: Monitor::new(&config.arm, &config.setup.monitor),
+            monitor: Monitor::new(&config.arm, &config.setup.monitor, config.period.seconds()),
             excess: Vector4::zeros(),
             error: Vector4::zeros(),
             replies: Deque::new(),
@@ -319,37 +320,13 @@ impl Controller {
             self.limits = self.limits | limited.flags;
             let qd = motion.qd;
             self.strain(readings, &qd);
+        } else {
+            self.stuck = 0;
         }
         probe.end(Phase::Limits);
         Actions {
             control: self.control_word(),
             torque: limited.motor_torque.into(),
-        }
-    }
-
-    /// Counts samples in which an axis hardly moves at its torque limit. An axis that speeds up may be at its limit; one that
-    /// stays there where it is meets something that the model does not have; one whose encoder does not move at all may be
-    /// anywhere.
-    // Out of line: rare in a sample.
-    #[inline(never)]
-    fn strain(&mut self, readings: &Readings, qd: &Vector4<f32>) {
-        let slow = self.config.arm.limits.velocity * SLOW;
-        let stands =
-            |axis: &Axis| axis.of(&self.excess) != 0.0 && axis.of(qd).abs() < axis.of(&slow);
-        let Some(axis) = Axis::ALL.into_iter().find(stands) else {
-            return;
-        };
-        self.saturated += 1;
-        let time = self.saturated as f32 * self.config.period.seconds();
-        let limit = self.setup.saturation_time;
-        if time >= limit {
-            let fault = if readings.is_still(axis) {
-                Fault::value(Cause::StuckSensor, axis.of(&self.error), 0.0)
-            } else {
-                Fault::value(Cause::OverTorque, time * 1e3, limit * 1e3)
-            };
-            let axis = axis.into();
-            self.fail(Fault { axis, ..fault });
         }
     }
 
