@@ -98,6 +98,8 @@ pub struct Controller {
     fault: Fault,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
     saturated: u32,
+    /// Samples in a row in which an encoder did not move with its axis at its torque limit, those off the reference several times.
+    stuck: u32,
     /// A fault not reported to the peers yet.
     alarm: Option<Fault>,
     /// What the last sample followed, as handed to the law.
@@ -135,10 +137,11 @@ impl Controller {
             fault: Fault::NONE,
             alarm: None,
             saturated: 0,
+            stuck: 0,
             queue: MoveQueue::new(),
             setpoint: Setpoint::rest(Vector4::zeros()),
             memory: Memory::new(),
-            monitor: Monitor::new(&config.arm, &config.setup.monitor),
+            monitor: Monitor::new(&config.arm, &config.setup.monitor, config.period.seconds()),
             excess: Vector4::zeros(),
             error: Vector4::zeros(),
             replies: Deque::new(),
@@ -323,6 +326,8 @@ impl Controller {
             let qd = motion.qd;
             self.ease(&torque, &qd);
             self.strain(readings, &qd);
+        } else {
+            self.stuck = 0;
         }
         probe.end(Phase::Limits);
         Actions {

@@ -56,7 +56,7 @@ impl MonitorLimits {
 #[derive(Clone, Copy, Debug)]
 pub struct Monitor {
     following_error: Vector4<f32>,
-    /// Following error that no axis can reach within a gap.
+    /// Change of the following error in a sample that no axis can make.
     jump: Vector4<f32>,
     speed: Vector4<f32>,
     /// Middle of the joint ranges, and how far from it a joint may be.
@@ -71,8 +71,8 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// A monitor of `arm` that has seen nothing.
-    pub fn new(arm: &ArmModel, limits: &MonitorLimits) -> Self {
+    /// A monitor of `arm`, sampled every `period` seconds, that has seen nothing.
+    pub fn new(arm: &ArmModel, limits: &MonitorLimits, period: f32) -> Self {
         let mut monitor = Self {
             following_error: Vector4::zeros(),
             jump: Vector4::zeros(),
@@ -85,16 +85,16 @@ impl Monitor {
             range_count: 0,
             velocity: Vector4::zeros(),
         };
-        monitor.adopt(arm, limits);
+        monitor.adopt(arm, limits, period);
         monitor
     }
 
     /// Adopts other limits and keeps the counts.
-    pub fn adopt(&mut self, arm: &ArmModel, limits: &MonitorLimits) {
+    pub fn adopt(&mut self, arm: &ArmModel, limits: &MonitorLimits, period: f32) {
         self.following_error = limits.following_error;
         self.speed = arm.limits.velocity * limits.speed_factor;
         // At full speed in the wrong direction.
-        self.jump = limits.following_error + self.speed * (2.0 * limits.gap);
+        self.jump = self.speed * (2.0 * period);
         self.reach = 0.5 * (arm.limits.upper - arm.limits.lower) + limits.range_margin;
         self.needed = limits.samples;
     }
@@ -112,13 +112,14 @@ impl Monitor {
         Some(Fault::value(cause, f32::from(status.bits()), 0.0))
     }
 
-    /// Judges one sample; `error` is reference minus measured position.
+    /// Judges one sample; `error` is reference minus measured position, `before` that of the last sample.
     pub fn check(
         &mut self,
         readings: &Readings,
         q: &Vector4<f32>,
         qd: &Vector4<f32>,
         error: &Vector4<f32>,
+        before: &Vector4<f32>,
     ) -> Option<Fault> {
         let following = first_beyond(error, &self.following_error);
         let speed = first_beyond(qd, &self.speed);
@@ -127,7 +128,7 @@ impl Monitor {
             self.reset();
             return None;
         }
-        self.trip(readings, [q, qd, error], [following, speed, range])
+        self.trip(readings, [q, qd, error, before], [following, speed, range])
     }
 
     /// Out of line: rarely reached in a sample.
@@ -135,14 +136,14 @@ impl Monitor {
     fn trip(
         &mut self,
         readings: &Readings,
-        [q, qd, error]: [&Vector4<f32>; 3],
+        [q, qd, error, before]: [&Vector4<f32>; 4],
         [following, speed, range]: [Option<Axis>; 3],
     ) -> Option<Fault> {
-        if self.following_count == 0
-            && let Some(axis) = first_beyond(error, &self.jump)
-        {
-            // The axis still followed in the last sample.
-            return Some(of_axis(Cause::EncoderFault, axis, error, &self.jump));
+        // A jump shows as a speed beyond its limit, if not as a following error.
+        let jump = self.jump * readings.steps as f32;
+        let moved = error - before;
+        if let Some(axis) = first_beyond(&moved, &jump) {
+            return Some(of_axis(Cause::EncoderFault, axis, &moved, &jump));
         }
         if self.following_count == 0 {
             self.velocity = readings.velocity;

@@ -91,6 +91,20 @@ impl Bench {
         self.position = self.drive.counts_of_motor_angle(&angle);
     }
 
+    /// Moves the elbow away from where it is; by more than 27 mrad at once is more than it can.
+    pub(crate) fn shove(&mut self, by: f64) {
+        self.position[1] += (by * 50.0 / std::f64::consts::TAU * 131_072.0) as i32;
+    }
+
+    /// Moves the elbow 75 mrad away, as fast as it can, and is in the first sample beyond its following error; then another 25 mrad.
+    pub(crate) fn shove_away(&mut self) {
+        for by in [0.025, 0.024, 0.026] {
+            self.shove(by);
+            self.step();
+        }
+        self.shove(0.025);
+    }
+
     /// A bench with torque on.
     pub(crate) fn enabled() -> Self {
         let mut bench = Self::new();

@@ -72,9 +72,9 @@ fn a_silent_peer_takes_the_torque_away_and_is_reported() {
 fn following_error_and_drive_faults_stop_the_arm() {
     let mut bench = Bench::enabled();
     // The elbow is pushed 0.1 rad away and comes back slowly.
-    bench.position[1] += (0.1 * 50.0 / std::f64::consts::TAU * 131_072.0) as i32;
     bench.velocity[1] = -10.0;
-    bench.run(2);
+    bench.shove_away();
+    bench.step();
     assert_eq!(bench.mode(), Mode::Enabled, "not before the third sample");
     bench.run(2);
     assert_eq!(bench.node.controller().cause(), Cause::FollowingError);
@@ -160,13 +160,14 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             repeat(&mut bench, frame)
         }
         Cause::FollowingError => {
-            bench.position[1] += (0.1 * 50.0 / std::f64::consts::TAU * 131_072.0) as i32;
             // 0.2 rad/s, back.
             bench.velocity[1] = -10.0;
-            bench.run(3)
+            bench.shove_away();
+            bench.run(2)
         }
         Cause::StuckSensor => {
-            bench.position[1] += (0.1 * 50.0 / std::f64::consts::TAU * 131_072.0) as i32;
+            // As for the torque, and the encoder stands.
+            bench.position[2] += (0.009 / 0.025 * 131_072.0) as i32;
             bench.run(3)
         }
         Cause::OverSpeed => {
@@ -237,9 +238,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::FollowingError => {
                 "following error, axis 2 (elbow): -0.100 rad, limit 0.050 rad".into()
             }
-            Cause::StuckSensor => {
-                "stuck sensor, axis 2 (elbow): -0.100 rad, limit 0.050 rad".into()
-            }
+            Cause::StuckSensor => "stuck sensor, axis 3 (lift): -9.0 mm, limit 0.5 mm".into(),
             Cause::OverTorque => "over torque, axis 3 (lift): 200.0 ms, limit 200.0 ms".into(),
             Cause::OverSpeed => "over speed, axis 3 (lift): 2.43 m/s, limit 2.42 m/s".into(),
             Cause::SoftLimit => "soft limit, axis 2 (elbow): 2.560 rad, limit 2.551 rad".into(),
@@ -271,6 +270,62 @@ fn drives_that_switch_off_by_themselves_are_a_fault() {
     assert_eq!(bench.mode(), Mode::Fault);
     let status = "drive fault: drive status ready encoder-valid";
     assert_eq!(bench.node.controller().fault().to_string(), status);
+}
+
+/// Nobody else says so, and the next word of a controller that is switching off would bring their torque back.
+#[test]
+fn drives_that_switch_off_before_they_are_told_to_are_a_fault() {
+    let mut bench = Bench::enabled();
+    let frame = bench.motion(MotionRequest::Disable);
+    bench.wire.to_node.push_back(frame);
+    bench.step();
+    assert_eq!(bench.mode(), Mode::Disabling);
+    bench.obeys = false;
+    bench.run(2);
+    assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
+}
+
+/// 2 x 1.1 x 12.2 rad/s is 27 mrad in a sample, at whatever rate and after however many lost samples; the following error is allowed
+/// 50 mrad.
+#[test]
+fn a_jump_that_no_axis_can_make_is_a_fault_of_the_encoder() {
+    for (rate, lost, jump) in [
+        (1000.0, 0, 0.0269),
+        (2000.0, 0, 0.0134),
+        (1000.0, 1, 0.0538),
+    ] {
+        for (share, expected) in [(0.98, Cause::None), (1.02, Cause::EncoderFault)] {
+            let mut bench = Bench::with(Config::new(IRB_930, Period::of_rate(rate)));
+            bench.enable();
+            bench.run(100);
+            (0..lost).for_each(|_| bench.lose());
+            bench.shove(share * jump);
+            // What the drives make of it: beyond the limit of 1.1 x 12.2 rad/s.
+            bench.velocity[1] = 700.0;
+            bench.step();
+            let cause = bench.node.controller().cause();
+            assert_eq!(cause, expected, "{rate} Hz, {lost} lost, {share}");
+        }
+    }
+}
+
+/// 9 mm are less than the following error allows, and more than the motor of the lift can correct.
+#[test]
+fn an_encoder_that_stands_while_its_motor_gives_everything_is_stuck() {
+    for (rate, samples) in [(1000.0, 3), (2000.0, 5)] {
+        for (velocity, expected) in [(0.0, Cause::StuckSensor), (-2.0, Cause::None)] {
+            let mut bench = Bench::with(Config::new(IRB_930, Period::of_rate(rate)));
+            bench.enable();
+            bench.run(100);
+            bench.position[2] += (0.009 / 0.025 * 131_072.0) as i32;
+            bench.velocity[2] = velocity;
+            bench.run(samples - 1);
+            assert_eq!(bench.mode(), Mode::Enabled, "{rate} Hz");
+            bench.step();
+            let cause = bench.node.controller().cause();
+            assert_eq!(cause, expected, "{rate} Hz, {velocity} rad/s");
+        }
+    }
 }
 
 /// The arm is stopped after a time, whatever the rate: 5 ms is 10 samples at 2 kHz.

@@ -1,7 +1,9 @@
 //! The drive side of the link: samples the plant into feedback and applies commands to it.
 //!
-//! It owns the sampling clock. A command acts when it arrives, not when it was due. Without a new one
-//! the last torque is held for [`HOLD_SAMPLES`], then the drives brake and switch torque off.
+//! It owns the sampling clock. A command acts when it arrives, not when it was due. Without a new one the last torque is held
+//! for [`HOLD_SAMPLES`], then the drives brake and switch torque off. A command that answers an older sample is none. Once off
+//! for want of commands, they take torque only to stop the arm while their brake closes, and then none until a command has let
+//! go of it: one that was on its way knows nothing of that, and an arm that stands is not to move again.
 
 mod settings;
 
@@ -49,6 +51,8 @@ pub struct Drives {
     /// Sample that the last command echoed.
     answered: Option<u32>,
     control: ControlWord,
+    /// Whether they have switched off by themselves, and no command has let go of torque since.
+    let_down: bool,
 }
 
 impl Drives {
@@ -68,6 +72,7 @@ impl Drives {
             period,
             answered: None,
             control: ControlWord::EMPTY,
+            let_down: false,
         }
     }
 
@@ -115,6 +120,7 @@ impl Drives {
     fn receive(&mut self, frame: &CanFrame, plant: &mut Plant) {
         if let Ok(received) = codec::decode(frame)
             && let Message::Command(command) = received.message
+            && self.age(command.sample) <= self.settings.hold_samples()
             && self.commands.check(received.counter.unwrap_or(0)).is_new()
         {
             self.apply(&command, plant);
@@ -152,12 +158,25 @@ impl Drives {
 
     fn apply(&mut self, command: &Command, plant: &mut Plant) {
         self.answered = Some(command.sample);
-        self.control = command.control;
-        let torque = self.settings.cut(command.torque);
-        self.cut = torque != command.torque.map(f64::from);
-        plant.set_motor_torque(torque);
-        plant.set_torque_enabled(command.control.contains(ControlWord::TORQUE_ENABLE));
-        plant.set_brake(!command.control.contains(ControlWord::BRAKE_RELEASE));
+        let (torque, release) = (ControlWord::TORQUE_ENABLE, ControlWord::BRAKE_RELEASE);
+        self.let_down &= command.control.contains(torque);
+        let stops =
+            command.control.contains(ControlWord::QUICK_STOP) || !command.control.contains(release);
+        self.control = if self.let_down && (!stops || plant.brake().is_closed()) {
+            ControlWord::EMPTY
+        } else {
+            command.control
+        };
+        let motor_torque = self.settings.cut(command.torque);
+        self.cut = motor_torque != command.torque.map(f64::from);
+        plant.set_motor_torque(motor_torque);
+        plant.set_torque_enabled(self.control.contains(torque));
+        plant.set_brake(!self.control.contains(release));
+    }
+
+    /// Samples since the one after `sample`.
+    fn age(&self, sample: u32) -> u32 {
+        self.sample.wrapping_sub(sample).wrapping_sub(1)
     }
 
     /// Brakes and switches torque off when commands stop arriving.
@@ -165,8 +184,8 @@ impl Drives {
         let Some(answered) = self.answered else {
             return;
         };
-        let age = self.sample.wrapping_sub(answered).wrapping_sub(1);
-        if age > self.settings.hold_samples() {
+        if self.age(answered) > self.settings.hold_samples() {
+            self.let_down |= self.control.contains(ControlWord::TORQUE_ENABLE);
             plant.set_brake(true);
             plant.set_torque_enabled(false);
             self.control = ControlWord::EMPTY;

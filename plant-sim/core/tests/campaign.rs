@@ -272,10 +272,11 @@ fn judge(fault: &str, payload: f64, defect: Option<Defect>) -> Verdict {
 }
 
 /// A small campaign: every kind of detection and reaction once.
-const CASES: [(&str, f64); 12] = [
+const CASES: [(&str, f64); 13] = [
     ("none", 2.0),
     ("feedback:loss@0.45s..0.452s", 2.0),
     ("feedback:corrupt@0.45s..0.452s", 2.0),
+    ("feedback:corrupt@0.45s..0.454s", 22.0),
     ("feedback:corrupt@0.45s..0.462s", 22.0),
     ("feedback:corrupt@0.7s..0.712s", 22.0),
     ("feedback:replay=8@0.45s..0.462s", 22.0),

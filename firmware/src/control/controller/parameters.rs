@@ -104,8 +104,9 @@ impl Store for Controller {
             }
             _ => {
                 let limits = &self.setup.monitor;
-                self.max_gap = limits.gap_samples(self.config.period.seconds());
-                self.monitor.adopt(&self.config.arm, limits);
+                let period = self.config.period.seconds();
+                self.max_gap = limits.gap_samples(period);
+                self.monitor.adopt(&self.config.arm, limits, period);
             }
         }
     }

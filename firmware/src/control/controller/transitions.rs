@@ -76,16 +76,20 @@ impl Controller {
         if !self.state.is_powered() {
             return;
         }
-        // Drives that missed commands have switched off by themselves, and would go on with the next. While the brake opens or
-        // closes, they may not be on yet or any more; after too long a gap in the feedback, the stop goes on with them.
-        let has_torque = !self.state.is_braking() && readings.steps <= self.max_gap;
+        // Drives that missed commands have switched off by themselves, and nobody else says so. While the brake opens they may not be
+        // on yet; after too long a gap in the feedback, the stop goes on with them.
+        let has_torque =
+            !matches!(self.state, State::Enabling(_)) && readings.steps <= self.max_gap;
         if let Some(fault) = Monitor::status(readings.status, has_torque) {
             self.fail(fault);
         }
         let error = self.setpoint.reference.q - q;
         // The reference of the last sample: at most one sample of motion older than `q`.
         let moved = self.setpoint.reference.qd * self.config.period.seconds();
-        if let Some(fault) = self.monitor.check(readings, q, qd, &(error + moved)) {
+        if let Some(fault) = self
+            .monitor
+            .check(readings, q, qd, &(error + moved), &self.error)
+        {
             self.fail(fault);
         }
     }

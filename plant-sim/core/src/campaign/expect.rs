@@ -10,6 +10,11 @@
 //! | feedback or commands gone | 8 samples | the drives switch off after 5 samples without a command, seen 2 samples later, and a frame may have been on its way |
 //! | 4 old feedback frames in a row | 5 samples | the third repeated or old frame |
 //! | an encoder that jumps further than the following error allows | 4 samples | three samples beyond a limit, and one to answer |
+//! | every attempt to send feedback or commands fails for up to 2 samples; what drives or controller receive is unreadable for as long | the same as without it | frames wait and are repeated: even after 32 attempts (bus-off) and 1.4 ms of recovery the next command is there within 5 samples |
+//! | the same for 9 samples or more | 8 samples | nothing gets through: the drives switch off as if it were lost |
+//! | nobody acknowledges feedback for 9 samples or more | 8 samples | after 16 attempts the drives are passive, and the same frame comes again and again: three repeated frames |
+//! | nobody acknowledges commands for 9 samples or more | 9 samples | one more command gets through once the controller is passive; it is repeated, and keeps all later ones waiting |
+//! | nobody tells a CAN controller to recover | the same as without it | nothing by itself: only after a bus-off |
 //!
 //! Whatever else breaks is judged by its effect: see [`super::bounds`].
 
@@ -18,11 +23,15 @@ use protocol::schema::Content;
 use protocol::time::{Duration, Instant, Period};
 
 use super::bounds::FOLLOWING_ERROR;
+use crate::bus::ErrorKind;
 use crate::faults::{Fault, FrameFault, What};
 use crate::plant::defect::EncoderDefect;
 
 /// Noise of a sound encoder, rad and m: two of its counts at the shoulder.
 const SOUND_NOISE: f64 = 1.2e-6;
+
+/// Samples for which the drives hold a command.
+const HOLD_SAMPLES: u32 = 5;
 
 /// What has to follow from a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +88,13 @@ fn of(fault: &Fault, period: Period) -> Expected {
             }
             _ => Expected::Either,
         },
+        What::Attempts(info, kind, 1.0) => match (info.content, kind) {
+            (Content::Command, ErrorKind::Ack) => by_length(2, 9, 9),
+            (Content::Feedback | Content::Command, _) => by_length(2, 9, 8),
+            _ => Expected::Either,
+        },
+        What::Misreads(Node::Drives | Node::Controller, 1.0) => by_length(2, 9, 8),
+        What::NoRecovery(_) => Expected::Survived,
         What::Encoder(axis, EncoderDefect::Jump(by)) if by.abs() > 2.0 * FOLLOWING_ERROR[axis] => {
             no_survival(by_length(0, 4, 4))
         }
@@ -95,9 +111,10 @@ fn no_survival(expected: Expected) -> Expected {
     }
 }
 
-/// How late a fault of the link makes a command that its sender sent in time.
+/// How late a fault of the link makes a command that its sender sent in time and the drives still take.
 pub(super) fn lateness(faults: &[Fault], period: Period) -> Duration {
     let late = |fault: &Fault| match fault.what {
+        What::Attempts(..) | What::Misreads(..) => is_taken(period),
         What::Frames(info, kind) if info.content == Content::Command => match kind {
             FrameFault::Delay(s) | FrameFault::Jitter(s) => Duration::from_seconds(s),
             FrameFault::Replay(back) => period.duration() * back as u32,
@@ -105,7 +122,13 @@ pub(super) fn lateness(faults: &[Fault], period: Period) -> Duration {
         },
         _ => Duration::ZERO,
     };
-    faults.iter().map(late).max().unwrap_or(Duration::ZERO)
+    let latest = faults.iter().map(late).max().unwrap_or(Duration::ZERO);
+    latest.min(is_taken(period))
+}
+
+/// How old the sample may be that a command answers: from docs/protocol.md, and the one that is under way.
+pub(super) fn is_taken(period: Period) -> Duration {
+    period.duration() * (HOLD_SAMPLES + 1)
 }
 
 /// Causes that leave the loops to be trusted: the brake has closed before torque goes off.

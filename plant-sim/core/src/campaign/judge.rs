@@ -6,12 +6,12 @@ use std::io;
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, ControlWord, Emergency, Message, Mode, Motion, MotionRequest, Node,
+    Cause, Command, ControlWord, Emergency, Message, Mode, Motion, MotionRequest, Node,
 };
 use protocol::time::{Duration, Instant, Period};
 
 use super::bounds::{Bounds, SAMPLES_TO_REPORT, STANDING};
-use super::expect::{Expected, expected, lateness, stops_under_control};
+use super::expect::{Expected, expected, is_taken, lateness, stops_under_control};
 use super::lift::Lift;
 use super::verdict::{Requirement, Verdict};
 use crate::faults::What;
@@ -46,9 +46,10 @@ pub struct Judge {
     /// Longest time from a report to the last command that does not know of it.
     reaction: Duration,
     missed: BTreeSet<Requirement>,
-    /// The last command, its sender being alive.
+    /// The newest command, its sender being alive.
     control: ControlWord,
-    /// Its time.
+    /// The sample that it answers, and its time.
+    answered: Option<u32>,
     commanded: Instant,
     /// Counter and sequence number of the operator's last request.
     request: (u8, u8),
@@ -64,7 +65,7 @@ pub struct Judge {
     /// Samples in a row with an axis beyond each kind of limit.
     beyond: [u32; 3],
     last: Option<PlantState>,
-    /// Last time of a motion.
+    /// End of the last motion.
     moving: f64,
     distance: f64,
     /// Of `distance`, what was travelled under torque after the detection.
@@ -96,6 +97,7 @@ impl Judge {
             reaction: period.duration() + lateness(&scenario.faults, period),
             missed: BTreeSet::new(),
             control: ControlWord::EMPTY,
+            answered: None,
             commanded: Instant::ORIGIN,
             request: (0, 0),
             report: None,
@@ -117,7 +119,13 @@ impl Judge {
         }
     }
 
-    /// The scenario has ended some time ago, completed or not. What follows is to be still.
+    /// Whether the arm has not moved for as long as this.
+    pub fn has_stood(&self, time: Duration) -> bool {
+        self.last
+            .is_some_and(|last| last.t - self.moving > time.seconds())
+    }
+
+    /// The scenario has ended, completed or not, and the arm has come to rest. What follows is to be still.
     pub fn ended(&mut self, completed: bool) {
         self.survived = completed && !self.is_detected();
         self.rest = self.last;
@@ -186,10 +194,18 @@ impl Judge {
     }
 
     /// The controller has commanded the drives.
-    fn commanded(&mut self, time: Instant, control: ControlWord, torque: &[f32; 4]) {
-        if !self.bounds.allows_torque(torque) {
+    fn commanded(&mut self, time: Instant, command: &Command) {
+        let control = command.control;
+        if !self.bounds.allows_torque(&command.torque) {
             self.miss(Requirement::Torque);
         }
+        // One that was overtaken or held up on its way does nothing any more.
+        let is_overtaken = self.answered.is_some_and(|newest| command.sample < newest);
+        let answers = self.period.sample(command.sample.into());
+        if is_overtaken || time.since(answers) > is_taken(self.period) {
+            return;
+        }
+        self.answered = Some(command.sample);
         let normal = control.contains(ControlWord::TORQUE_ENABLE)
             && control.contains(ControlWord::BRAKE_RELEASE)
             && !control.contains(ControlWord::QUICK_STOP);
@@ -314,7 +330,7 @@ impl Observer for Judge {
             return Ok(());
         };
         match received.message {
-            Message::Command(command) => self.commanded(time, command.control, &command.torque),
+            Message::Command(command) => self.commanded(time, &command),
             Message::Emergency(Node::Controller, Emergency { cause, .. })
                 if cause != Cause::None =>
             {

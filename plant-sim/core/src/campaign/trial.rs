@@ -11,8 +11,10 @@ use crate::rig::{Rig, RunError};
 use crate::run::{Failure, assemble};
 use crate::setup::RunConfig;
 
-/// How long the arm has after the end of its run to come to rest, is watched then, and again after a request to switch on.
+/// How long an arm is watched that is to stand: after it has come to rest, and again after a request to switch on.
 const WATCHED: Duration = Duration::from_millis(50);
+/// How long an arm without torque may coast after the end of its run, as long as the operator waits for one that has stopped.
+const COASTING: Duration = Duration::from_millis(5000);
 
 /// Runs a case with the controller that `connect` starts, and judges it. Then the rig and the end of the run are there for
 /// whoever wants a summary.
@@ -28,7 +30,11 @@ pub fn run<'p, C: Peer + 'p, O: Observer>(
     let mut observers = (Judge::new(config), observer);
     let result = rig.run(&mut (), &mut observers);
     // A scenario ends as soon as torque is off: time to come to rest.
+    let latest = rig.now() + COASTING;
     watch(&mut rig, &mut observers)?;
+    while !observers.0.has_stood(WATCHED) && rig.now() < latest {
+        watch(&mut rig, &mut observers)?;
+    }
     observers.0.ended(result.is_ok());
     watch(&mut rig, &mut observers)?;
     if let Some(frame) = observers.0.temptation() {
