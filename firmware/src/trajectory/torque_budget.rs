@@ -71,7 +71,7 @@ impl TorqueBudget<'_> {
             push: self.torques(&push),
             rest: self.torques(&self.body.lagrange.gravity()),
         };
-        (self.room(&need, 0.0), self.quickest(&need))
+        (self.rooms(&need).1, self.quickest(&need))
     }
 
     /// By what factor the path acceleration of `along` could grow before the first torque
@@ -79,8 +79,7 @@ impl TorqueBudget<'_> {
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
         let mut need = self.need(here, along.v);
         need.push *= along.a;
-        // Less than a hundredth of the limit: another sample decides.
-        self.room(&need, 0.01)
+        self.rooms(&need).1
     }
 
     /// How fast the motors can change the acceleration along the path, 1/s³; infinite where nothing moves.
@@ -134,25 +133,9 @@ impl TorqueBudget<'_> {
         self.torques(&torque)
     }
 
-    /// By what factor `push` could grow before it and `rest` together need more than their share of
-    /// a torque; those that need no more than a part `smallest` of it for `push` are left out.
-    fn room(&self, need: &Need, smallest: f32) -> f32 {
-        let limits = self.torque_limits();
-        let mut room = f32::MAX;
-        for ((push, rest), limit) in need.push.iter().zip(need.rest.iter()).zip(limits.iter()) {
-            let (need, rest) = if *push < 0.0 {
-                (-push, -rest)
-            } else {
-                (*push, *rest)
-            };
-            if need > smallest * limit {
-                room = room.min((limit - rest) / need);
-            }
-        }
-        room
-    }
-
     /// How far `push` may go down and up from none before it and `rest` together need more than their share of a torque.
+    // Out of line, for the size of one copy.
+    #[inline(never)]
     fn rooms(&self, need: &Need) -> (f32, f32) {
         let limits = self.torque_limits();
         let (mut down, mut up) = (f32::MAX, f32::MAX);

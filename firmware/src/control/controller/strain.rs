@@ -26,18 +26,16 @@ impl Controller {
         if self.state != State::Moving {
             return;
         }
-        let (arm, drive) = (&self.config.arm, &self.body.drive);
-        let joint = torque.component_div(&arm.limits.effort);
-        let motor = drive
-            .motor_torque(torque)
-            .component_div(&arm.drive.motor_torque_limit);
-        let needed = joint.abs().sup(&motor.abs());
-        let axis = needed.imax();
-        let speeds_up = torque
-            .get(axis)
-            .zip(qd.get(axis))
-            .is_some_and(|(torque, qd)| torque * qd > 0.0);
-        self.queue.ease(needed.max(), speeds_up);
+        // More than this where the motor of the wrist has to turn lift and wrist, which neither shows by itself.
+        let (mut needed, mut speeds_up) = (1.0, false);
+        let limits = self.body.torque_limit.iter();
+        for ((torque, qd), limit) in torque.iter().zip(qd.iter()).zip(limits) {
+            let share = torque.abs() / limit;
+            if share > needed {
+                (needed, speeds_up) = (share, torque * qd > 0.0);
+            }
+        }
+        self.queue.ease(needed, speeds_up);
     }
 
     /// Judges a sample in which a torque was cut. An axis that speeds up may be at its limit. One whose encoder does not move
