@@ -79,7 +79,20 @@ impl TorqueBudget<'_> {
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
         let mut need = self.need(here, along.v);
         need.push *= along.a;
-        self.rooms(&need).1
+        let limits = self.torque_limits();
+        let mut room = f32::MAX;
+        for ((push, rest), limit) in need.push.iter().zip(need.rest.iter()).zip(limits.iter()) {
+            let (need, rest) = if *push < 0.0 {
+                (-push, -rest)
+            } else {
+                (*push, *rest)
+            };
+            // Less than a hundredth of the limit: another sample decides.
+            if need > 0.01 * limit {
+                room = room.min((limit - rest) / need);
+            }
+        }
+        room
     }
 
     /// How fast the motors can change the acceleration along the path, 1/s³; infinite where nothing moves.
