@@ -3,7 +3,7 @@
 use firmware::control::controller::{Config, Controller};
 use firmware::control::states::Event;
 use firmware::mechanics::arm::IRB_930;
-use protocol::messages::{Compensation, Law, Message, MotionRequest, Outcome, RefusalReason};
+use protocol::messages::{Compensation, Law, Message, Mode, MotionRequest, Outcome, RefusalReason};
 
 use crate::bench::{Bench, PERIOD};
 
@@ -127,4 +127,38 @@ fn a_payload_is_checked_by_the_rule_of_the_model() {
         refused(2.0, f32::NAN, 0.1),
         Some((RefusalReason::NotFinite, 0.0, 0.0))
     );
+}
+
+/// The pace that the last of these messages reports, %.
+fn pace(sent: &[Message]) -> Option<u8> {
+    let paces = sent.iter().filter_map(|message| match message {
+        Message::State(state) => Some(state.pace),
+        _ => None,
+    });
+    paces.last()
+}
+
+#[test]
+fn the_override_holds_a_move_and_lets_it_go_on() {
+    let mut bench = Bench::moving();
+    let set = |pace| MotionRequest::SetOverride { pace };
+    assert_eq!(bench.request(set(0.0)), Some(Outcome::Accepted));
+    let sent = bench.run(1000);
+    assert_eq!((pace(&sent), bench.mode()), (Some(0), Mode::Moving));
+    let held = *bench.node.controller().reference();
+    assert_eq!((held.qd, held.qdd), Default::default());
+    bench.run(1000);
+    assert_eq!(*bench.node.controller().reference(), held);
+    assert_eq!(bench.request(set(0.6)), Some(Outcome::Accepted));
+    let sent = bench.run(1000);
+    assert_eq!((pace(&sent), bench.mode()), (Some(60), Mode::Enabled));
+    assert_ne!(bench.node.controller().reference().q, held.q);
+    // It stays, whatever the state.
+    assert_eq!(
+        bench.request(MotionRequest::Disable),
+        Some(Outcome::Accepted)
+    );
+    assert_eq!(pace(&bench.run(100)), Some(60));
+    assert_eq!(bench.request(set(1.0)), Some(Outcome::Accepted));
+    assert_eq!(pace(&bench.run(100)), Some(100));
 }

@@ -213,6 +213,36 @@ fn a_stop_follows_a_move_at_once_and_ends_the_scenario() {
 }
 
 #[test]
+fn a_scenario_goes_on_at_another_speed() {
+    let (mut run, mut seen) = (begin(&config()), Seen::new());
+    let pace = |pace| Order::Request(MotionRequest::SetOverride { pace });
+    let texts = |answers: Vec<Answer>| -> Vec<String> {
+        answers.into_iter().map(|answer| answer.text).collect()
+    };
+    live(&mut run, &mut seen, 0.4);
+    run.order(pace(0.0));
+    let answers = live(&mut run, &mut seen, 2.0);
+    assert_eq!(texts(answers), ["set-override: accepted"]);
+    assert!(run.is_scripted());
+    let held = seen.truth.unwrap().plant.q;
+    // Longer than any move takes at full speed.
+    assert!(live(&mut run, &mut seen, 60.0).is_empty());
+    let stands = seen.truth.unwrap().plant.q;
+    let moved = held
+        .iter()
+        .zip(stands)
+        .map(|(one, other)| (one - other).abs());
+    assert!(moved.fold(0.0, f64::max) < 1e-5, "{held:?} {stands:?}");
+    assert_eq!(seen.mode(), Mode::Moving);
+    run.order(pace(0.5));
+    let answers = live(&mut run, &mut seen, 4.0);
+    assert_eq!(
+        texts(answers),
+        ["set-override: accepted", "scenario: completed"]
+    );
+}
+
+#[test]
 fn an_emergency_stop_is_acknowledged_and_the_scenario_begins_anew() {
     let (mut run, mut seen) = standing();
     run.order(Order::EmergencyStop);
@@ -294,6 +324,7 @@ fn orders() -> impl Strategy<Value = Order> {
                 posture
             }
         )),
+        (0.0_f32..1.2).prop_map(|pace| Order::Request(MotionRequest::SetOverride { pace })),
         (target, -0.1_f32..1.2)
             .prop_map(|(target, speed)| Order::Request(MotionRequest::MoveJoint { target, speed })),
     ]
