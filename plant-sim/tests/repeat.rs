@@ -138,10 +138,11 @@ fn two_robots_of_files_are_repeated() {
 #[test]
 fn a_run_that_ends_in_a_fault_is_repeated_and_says_how_it_ended() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("heavy.toml");
-    let scenario = include_str!("../scenarios/gate-mismatch.toml")
-        .replace("friction = 1.2", "friction = 9")
-        .replace("payload = 1.1", "payload = 9");
+    let path = folder.path().join("dead.toml");
+    let scenario = include_str!("../scenarios/gate-mismatch.toml").replace(
+        "\nrate_hz",
+        "\nfaults = [\"motor:elbow:dead@0.5s\"]\nrate_hz",
+    );
     fs::write(&path, scenario).unwrap();
     let summary = repeated(&["--scenario", path.to_str().unwrap()]);
     assert_eq!(summary["completed"], false);

@@ -137,14 +137,14 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                     one("compensation", compensation.code()),
                 ],
                 MotionRequest::SetGains {
-                    bandwidth,
-                    damping,
-                    observer,
+                    bandwidth: b,
+                    damping: d,
+                    observer: o,
                 } => vec![
                     one("request", 9),
-                    one("bandwidth", bandwidth),
-                    one("damping", damping),
-                    one("observer", observer),
+                    one("bandwidth", b),
+                    one("damping", d),
+                    one("observer", o),
                 ],
                 MotionRequest::SetOverride { pace } => {
                     vec![one("request", 10), one("override_pace", pace)]
@@ -274,14 +274,8 @@ fn signals_stand_side_by_side() {
             assert!(end <= info.body_len(), "{}", info.name);
         }
         // A shorter frame would not hold the longest variant.
-        let longest = info
-            .signals
-            .iter()
-            .map(|signal| signal.end())
-            .max()
-            .unwrap()
-            + info.len
-            - info.body_len();
+        let ends = info.signals.iter().map(|signal| signal.end());
+        let longest = ends.max().unwrap() + info.len - info.body_len();
         let needed = if info.is_fd() {
             protocol::frame::fd_length(longest).unwrap()
         } else {

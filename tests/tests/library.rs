@@ -20,9 +20,9 @@ const TWINS: [(&str, &[&str], &[&str]); 19] = [
     ("gate", &["law=pid"], &["tracking", "settling"]),
     ("gate-mismatch", &["law=pd-gravity"], &["tracking"]),
     ("gate-vertical", &["cycle[0].jump.speed=0.3"], &["cycle"]),
-    ("gate-22kg", &["mismatch.payload=1.3"], &["tracking"]),
+    ("gate-22kg", &["law=pd-gravity"], &["tracking"]),
     ("heavier-load", &["law=pd-gravity"], &["tracking"]),
-    ("override", &["cycle[2].override.to=1.0"], &["pace"]),
+    ("override", &["cycle[3].override.after=0.0"], &["pace"]),
     (
         "square",
         &["gains.bandwidth=20", "mismatch.friction=1.5"],

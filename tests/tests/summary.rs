@@ -71,7 +71,9 @@ fn a_motor_at_its_limit_is_seen_as_long_as_it_is_there() {
         summary.longest_saturation_s,
         effort.longest.map(|samples| samples as f64 / 1000.0)
     );
-    assert_eq!((summary.cycles, summary.cycles_asked), (0, 1));
+    // It arrives all the same, at another pace.
+    assert_eq!((summary.cycles, summary.cycles_asked), (1, 1));
+    assert!(summary.pace < 0.9, "{}", summary.pace);
 }
 
 /// The wrist turns by 3 rad no faster than its limit of speed (29.7 rad/s) and its torque allow: 30 N m, and 0.0204 kg m2 of shaft

@@ -262,13 +262,12 @@ fn silence_of_the_controller_is_a_result() {
     assert!(summary.speed_utilisation[0] > 0.1);
 }
 
-/// A robot ten times as stiff as its model: the first fault is reported, not the move refused after it, and the run
-/// continues until every axis is at rest.
+/// A motor that dies in motion: the first fault is reported, not the move refused after it, and the run continues until every
+/// axis is at rest.
 #[test]
 fn the_first_fault_is_reported_and_the_arm_comes_to_rest() {
     let mut config = gate();
-    config.scenario.mismatch.friction = 10.0;
-    config.scenario.mismatch.payload = 10.0;
+    config.scenario.faults = vec!["motor:elbow:dead@0.4s".parse().unwrap()];
     let mut seen = Seen::default();
     let summary = in_process(&config, &mut seen).unwrap();
     let first = &summary.faults[0];

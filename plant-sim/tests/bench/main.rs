@@ -273,10 +273,7 @@ fn the_bytes_do_not_depend_on_the_number_of_threads() {
     // The header, two gates, and each with two frictions and two payloads.
     assert_eq!(one[1].lines().count(), 1 + 2 + 2 * 4);
     let text = bench(folder.path(), &["--quick"]);
-    assert!(
-        text.contains("mid-tan with 22 kg at 1000 Hz, friction x 0.7, payload x 1.2: "),
-        "{text}"
-    );
+    assert_eq!(text.matches("| 0 of 1 |").count(), 2 * 4, "{text}");
 }
 
 #[test]
