@@ -17,8 +17,7 @@ summary() { # summary NAME ARGUMENT...
 summary run --cycles 2 --json
 cmp "$work/run.out" "$work/run/summary.json"
 summary robots --set requirements=[] --cycles 1 --plant-model plant-sim/models/irb930-12-0.85.json
-sed 's/^friction = .*/friction = 9/; s/^payload = .*/payload = 9/' plant-sim/scenarios/gate-mismatch.toml >"$work/fault.toml"
-summary fault --scenario "$work/fault.toml"
+summary fault --scenario gate-mismatch --fault motor:elbow:dead@0.5s
 grep -q '"completed": false' "$work/fault/summary.json"
 {
     sed -n '1,/^\[\[cycle/p' plant-sim/scenarios/gate.toml
@@ -54,9 +53,8 @@ validate controller-model "$work/controller-model.json"
 "$plant_sim" check --set cycle[0].jump.top=-0.29 --json >"$work/refused.json" 2>"$work/refused.err" && fail "nothing is refused"
 validate plan "$work/plan.json" "$work/refused.json"
 
-echo "- gates beside the optimum, complete and not"
+echo "- gates beside the optimum"
 "$plant_sim" bench motion --quick --json >"$work/bench.json"
-grep -q '"fault": "' "$work/bench.json"
 grep -q '"fault": null' "$work/bench.json"
 validate motion-bench "$work/bench.json"
 
