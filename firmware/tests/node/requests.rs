@@ -131,11 +131,10 @@ fn a_payload_is_checked_by_the_rule_of_the_model() {
 
 /// The pace that the last of these messages reports, %.
 fn pace(sent: &[Message]) -> Option<u8> {
-    let paces = sent.iter().filter_map(|message| match message {
+    sent.iter().rev().find_map(|message| match message {
         Message::State(state) => Some(state.pace),
         _ => None,
-    });
-    paces.last()
+    })
 }
 
 #[test]
