@@ -79,6 +79,7 @@ impl TorqueBudget<'_> {
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
         let mut need = self.need(here, along.v);
         need.push *= along.a;
+        // Not by `rooms`, which looks both ways: it costs 190 instructions more in what is the dearest step of planning.
         let limits = self.torque_limits();
         let mut room = f32::MAX;
         for ((push, rest), limit) in need.push.iter().zip(need.rest.iter()).zip(limits.iter()) {
