@@ -104,7 +104,7 @@ fn check(
         need(arm, &body, payload, &planned.at(arm, t).unwrap()).max(most)
     }) + 0.01;
     let mut before = Reference::rest(*from);
-    let mut at = 0.0;
+    let (mut at, mut begun) = (0.0, false);
     for sample in 0.. {
         let t = sample as f32 * PERIOD;
         for (_, pace) in changes
@@ -137,7 +137,11 @@ fn check(
             );
         }
         // On the path: where the trajectory is at its own time.
-        at += 0.5 * f64::from(pace + run.queue.pace_now()) * f64::from(PERIOD);
+        // The first sample finds the arm at rest.
+        if begun {
+            at += 0.5 * f64::from(pace + run.queue.pace_now()) * f64::from(PERIOD);
+        }
+        begun |= pace > 0.0;
         let there = planned.at(arm, at as f32).unwrap();
         // A thousandth of a sample for the rounding of time.
         let off = (there.q - here.q).abs() - there.qd.abs() * (1e-3 * PERIOD);

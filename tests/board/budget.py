@@ -19,7 +19,7 @@ TOLERANCE = 0.10
 SLACK = 16
 HERE = pathlib.Path(__file__).parent
 FIGURES = HERE / "budget.csv"
-FLASH, RAM, STACK, CALL, LAW = 96 * 1024, 16 * 1024, 4096, 4000, 600
+FLASH, RAM, STACK, CALL, LAW = 128 * 1024, 16 * 1024, 4096, 4000, 600
 GOALS = {
     "flash": FLASH, "ram": RAM, "stack_used": STACK, "stack_bound": STACK,
     "sample_max": CALL, "sample_planning_max": CALL, "other_frame_max": CALL, "no_frame_max": CALL, "law_max": LAW,

@@ -19,14 +19,23 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// At the beginning of a trajectory, where the arm is at rest and any time scale is as good as another.
+    /// Before the beginning of a trajectory: its first sample finds the arm at rest, where any time scale is as good as
+    /// another, and looks ahead to where it moves.
     pub fn new(pace: f32) -> Self {
         Self {
             ticks: 0,
-            fraction: 0.0,
+            fraction: -1.0,
             time_scale: pace,
             slope: 0.0,
             pace,
+        }
+    }
+
+    /// A few samples, or part of one, past the beginning of a trajectory.
+    pub fn begun(pace: f32, samples: f32) -> Self {
+        Self {
+            fraction: samples,
+            ..Self::new(pace)
         }
     }
 
@@ -34,7 +43,8 @@ impl Clock {
     pub fn set_pace(&mut self, pace: f32) {
         self.pace = pace;
         if self.ticks == 0 && self.fraction <= 0.0 {
-            *self = Self::new(pace);
+            self.time_scale = pace;
+            self.slope = 0.0;
         }
     }
 
@@ -65,6 +75,12 @@ impl Clock {
 
     /// Advances by one sample.
     pub fn advance(&mut self, period: f32) {
+        if self.fraction < 0.0 {
+            if self.time_scale > 0.0 {
+                self.fraction = 0.0;
+            }
+            return;
+        }
         let before = self.time_scale;
         self.time_scale = clamp(before + self.slope * period, 0.0, 1.0);
         // There, or past it.

@@ -11,8 +11,8 @@
 //!
 //! Constant joint acceleration limits would waste half of the robot: a SCARA is bounded by motor torque, and inertia
 //! changes along the way. The planner therefore scales an S-curve to the torques of the model. Its jerk follows from the time in
-//! which the motors take up their torque. Torque is affine in the path acceleration, so each round corrects the two accelerations (speeding up, braking) by the worst ratio of torque
-//! left to torque needed; in the last pass, inverse dynamics is quadratic in the time scale, and the planner solves for
+//! which the motors take up their torque. Torque is affine in the path acceleration, so each round corrects the accelerations (speeding up and braking, next to rest and next to the peak speed) by the ratio of torque
+//! left to torque needed there; in the last pass, inverse dynamics is quadratic in the time scale, and the planner solves for
 //! the scale at which the worst sample touches its limit (Hollerbach, *Dynamic scaling of manipulator
 //! trajectories*, 1984).
 
@@ -25,7 +25,7 @@ use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
 use super::path::{Path, PathPoint};
-use super::profile::{Bounds, SCurve};
+use super::profile::{Bounds, HalfBounds, SCurve};
 use super::request::{Request, Target, from_path};
 use super::torque_budget::TorqueBudget;
 use super::{Reference, Trajectory};
@@ -35,11 +35,11 @@ use verify::{Before, LINE_STEPS};
 
 /// Survey points on a line.
 const SURVEY_POINTS: u8 = 24;
-/// Corrections of the two accelerations.
+/// Corrections of the accelerations.
 const ROUNDS: u8 = 2;
 /// Samples of each half of the profile in one round.
 const BALANCE_POINTS: u8 = 3;
-/// Largest factor by which one round reduces an acceleration.
+/// Largest factor by which one round changes an acceleration.
 const STEP: f32 = 1.6;
 /// Moves whose every axis travels less than this (rad or m) end where they begin.
 const NO_TRAVEL: f32 = 1e-6;
@@ -68,7 +68,8 @@ enum Stage {
     Balance {
         round: u8,
         point: u8,
-        gain: [f32; 2],
+        /// New accelerations of the half, next to rest and next to the peak speed.
+        wanted: [f32; 2],
     },
     /// How much higher than asked for one stroke of a jump should go.
     Raise {
@@ -160,9 +161,9 @@ impl Planner {
             },
             bounds: Bounds {
                 speed: 1.0,
-                accelerate: 1.0,
-                brake: 1.0,
                 jerk: 1.0,
+                accelerate: HalfBounds::even(1.0, 1.0),
+                brake: HalfBounds::even(1.0, 1.0),
             },
             target: Target::Joints(Vector4::zeros()),
             speed: 1.0,
@@ -232,7 +233,11 @@ impl Planner {
                 self.compose(round);
                 Ok(())
             }
-            Stage::Balance { round, point, gain } => self.balance(budget, round, point, gain),
+            Stage::Balance {
+                round,
+                point,
+                wanted,
+            } => self.balance(budget, round, point, wanted),
             Stage::Verify {
                 t,
                 time_scale,
@@ -304,7 +309,7 @@ impl Planner {
             Stage::Balance {
                 round,
                 point: 0,
-                gain: [STEP; 2],
+                wanted: [0.0; 2],
             }
         } else if self.jump.is_some() {
             Stage::Raise { down: false }

@@ -208,14 +208,28 @@ impl MoveQueue {
             stopping,
         } = *stride;
         let here = setpoint.reference.q;
-        let Some(trajectory) = self.moves.front() else {
+        if self.moves.is_empty() {
             *setpoint = Setpoint::rest(here);
             return Progress::Arrived;
-        };
+        }
         for _ in 0..steps {
             self.clock.advance(period);
         }
-        let t = self.clock.time(period);
+        let mut t = self.clock.time(period);
+        if !stopping
+            && self.moves.len() > 1
+            && let Some(last) = self.moves.front()
+            && t >= last.duration()
+        {
+            // The next move begins where and when this one ends, within the sample.
+            t -= last.duration();
+            self.completed = last.sequence;
+            self.moves.pop_front();
+            self.clock = Clock::begun(self.pace(), t / period);
+        }
+        let Some(trajectory) = self.moves.front() else {
+            return Progress::Arrived;
+        };
         let (sequence, ended) = (trajectory.sequence, t >= trajectory.duration());
         let ahead = self.clock.lead(lead);
         if trajectory.follow(budget.arm, t, ahead, setpoint).is_err() {

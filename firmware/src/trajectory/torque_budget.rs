@@ -5,7 +5,7 @@ use protocol::messages::{Refusal, RefusalReason};
 
 use super::Reference;
 use super::path::PathPoint;
-use super::profile::{Bounds, Sample};
+use super::profile::{Bounds, HalfBounds, Sample};
 use crate::mechanics::arm::{ArmModel, Axis};
 use crate::mechanics::body::{Body, Torques};
 use crate::mechanics::kinematics::Trig;
@@ -261,38 +261,51 @@ impl TorqueBudget<'_> {
         self.arm.limits.velocity.inf(&motor)
     }
 
-    /// Bounds of the vertical strokes of a jump, up and down, over at most `height` m. Gravity and friction are
-    /// subtracted from the available force; friction never adds to it.
+    /// Bounds of the vertical strokes of a jump, up and down, over at most `height` m. Friction takes from the force that speeds
+    /// up, and adds to the one that brakes.
     #[inline(never)]
     pub fn lift(&self, height: f32) -> (Bounds, Bounds) {
         let limits = &self.arm.limits;
         let mass = self.body.nominal_inertia.z;
         let weight = -self.body.lagrange.gravity().z;
-        let speed = self.speed().z;
         let force = self.torque_limits().z;
         let cap = limits.acceleration.z.min((force + weight.abs()) / mass);
-        let peak = sqrt(cap * height).min(speed);
-        let friction = self.arm.drive.coulomb.z + self.arm.drive.viscous.z * peak;
-        // Viscous friction grows with the speed while the acceleration grows.
-        let viscous = self.arm.drive.viscous.z * cap;
-        let rate = RATE_SHARE * self.body.torque_rate.z;
-        let jerk = limits.jerk.z.min((rate - viscous).max(0.1 * rate) / mass);
+        let coulomb = self.arm.drive.coulomb.z;
+        let viscous = self.arm.drive.viscous.z;
         // Strokes that the drive cannot hold have been refused: this keeps the bound positive for one close to the
         // limit.
         let within = |force: f32| clamp(force / mass, 0.01 * cap, cap);
-        let up = Bounds {
-            speed,
-            accelerate: within(force - weight - friction),
-            brake: within(force + weight),
-            jerk,
+        // Viscous friction grows with the speed while the acceleration grows.
+        let rate = RATE_SHARE * self.body.torque_rate.z;
+        let jerk = limits
+            .jerk
+            .z
+            .min((rate - viscous * cap).max(0.1 * rate) / mass);
+        let stroke = |lifting: f32, braking: f32| {
+            let (lifting, braking) = (lifting - coulomb, braking + coulomb);
+            let (up, down) = (within(lifting), within(braking));
+            // The peak speed without ramps.
+            let peak = sqrt(2.0 * height * up * down / (up + down)).min(self.speed().z);
+            let lost = viscous * peak;
+            Bounds {
+                speed: self.speed().z,
+                jerk,
+                accelerate: HalfBounds {
+                    jerk,
+                    slow: up,
+                    fast: within(lifting - lost),
+                },
+                brake: HalfBounds {
+                    jerk,
+                    slow: down,
+                    fast: within(braking + lost),
+                },
+            }
         };
-        let down = Bounds {
-            speed,
-            accelerate: within(force + weight - friction),
-            brake: within(force - weight),
-            jerk,
-        };
-        (up, down)
+        (
+            stroke(force - weight, force + weight),
+            stroke(force + weight, force - weight),
+        )
     }
 }
 

@@ -155,7 +155,7 @@ fn every_parameter_is_kept_by_itself() {
         let value = if rule.kind == Kind::Whole {
             rule.lower + 1.0
         } else {
-            0.8 * rule.lower + 0.2 * rule.upper_at(1e-3)
+            0.9 * rule.lower + 0.1 * rule.upper_at(1e-3)
         };
         bench.set(parameter, value);
         // A new sample does not bring the old value back.
@@ -225,7 +225,7 @@ fn the_bandwidth_changes_the_next_command() {
     bench.run(100);
     bench.push(0, 0.001);
     let before = bench.command().torque[0];
-    bench.set(ControllerParameter::Bandwidth, 75.0);
+    bench.set(ControllerParameter::Bandwidth, 85.0);
     let after = bench.command().torque[0];
     let ratio = before / after;
     // Encoder counts round the push.

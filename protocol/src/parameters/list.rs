@@ -61,11 +61,11 @@ parameters! {
         /// Payload mass that the control law uses, as set by set-payload.
         PayloadMass = 0x0001, "payload-mass", "kg", Never, reading(0.0, 100.0);
         /// Natural frequency of the error dynamics.
-        Bandwidth = 0x0010, "bandwidth", "rad/s", AtRest, corner(1.0, 1000.0, (150.0, 0.15));
+        Bandwidth = 0x0010, "bandwidth", "rad/s", AtRest, corner(1.0, 1000.0, (190.0, 0.17));
         /// Damping ratio of the error dynamics.
         Damping = 0x0011, "damping", "", AtRest, real(0.1, 5.0, 1.0);
         /// Corner frequency of the disturbance observer, or 1 / integral time.
-        Observer = 0x0012, "observer", "rad/s", AtRest, corner(0.1, 1000.0, (100.0, 0.1));
+        Observer = 0x0012, "observer", "rad/s", AtRest, corner(0.1, 1000.0, (190.0, 0.17));
         /// Time from a sample until its command acts: two frames at the default bit timing, and the computing time.
         CommandDelay = 0x0013, "command-delay", "s", AtRest, real(0.0, 5e-3, 249.6e-6);
         /// Following error of the shoulder that stops the arm.

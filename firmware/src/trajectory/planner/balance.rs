@@ -1,53 +1,64 @@
-//! Rounds that raise or lower both accelerations of the profile until they use the torque limits fully.
+//! Rounds that raise or lower the accelerations of the profile until they use the torque limits fully.
 
 use protocol::messages::Refusal;
 
 use super::{BALANCE_POINTS, Planner, STEP, Stage, fill};
 use crate::mechanics::arm::ArmModel;
+use crate::mechanics::math::{clamp, least};
 use crate::trajectory::path::Path;
 use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Planner {
-    /// One sample of one half; at the end of a round, new accelerations.
+    /// One sample of one half: the end of its hold next to rest, the one next to the peak speed, and its middle. At the end of a
+    /// half, its new accelerations.
     #[inline(never)]
     pub(super) fn balance(
         &mut self,
         budget: &TorqueBudget<'_>,
         round: u8,
         point: u8,
-        gain: [f32; 2],
+        wanted: [f32; 2],
     ) -> Result<(), Refusal> {
         let profile = &self.draft.profile;
         let braking = point >= BALANCE_POINTS;
-        let share = (f32::from(point % BALANCE_POINTS) + 0.5) / f32::from(BALANCE_POINTS);
-        let (from, to) = if braking {
-            (profile.brake_start(), profile.duration())
-        } else {
-            (0.0, profile.accelerate_end())
+        let (slow, hold) = profile.hold(braking);
+        let which = point % BALANCE_POINTS;
+        let share = match which {
+            0 => 0.0,
+            1 => 1.0,
+            _ => 0.5,
         };
-        let along = profile.at(from + share * (to - from));
+        let along = profile.at(slow + share * hold);
         let here = self.point(budget.arm, along.s)?;
-        let [mut speeding_gain, mut braking_gain] = gain;
         let room = budget.acceleration_room(&here, &along);
-        if braking {
-            braking_gain = braking_gain.min(room);
-        } else {
-            speeding_gain = speeding_gain.min(room);
-        }
-        if point + 1 < 2 * BALANCE_POINTS {
-            self.stage = Stage::Balance {
+        let ceiling = self.acceleration_ceiling(budget.arm);
+        let peak = along.a.abs();
+        let next = least(peak * clamp(room, 1.0 / STEP, STEP), ceiling);
+        let [slow, fast] = wanted;
+        let wanted = match which {
+            0 => [next, fast],
+            1 => [slow, next],
+            _ => {
+                // What the middle allows, the mean of the ends keeps.
+                let share = clamp(2.0 * next / (slow + fast), 1.0 / STEP, 1.0);
+                let half = if braking {
+                    &mut self.bounds.brake
+                } else {
+                    &mut self.bounds.accelerate
+                };
+                (half.slow, half.fast) = (slow * share, fast * share);
+                [0.0; 2]
+            }
+        };
+        self.stage = if point + 1 < 2 * BALANCE_POINTS {
+            Stage::Balance {
                 round,
                 point: point + 1,
-                gain: [speeding_gain, braking_gain],
-            };
-            return Ok(());
-        }
-        let (up, down) = profile.peaks();
-        let ceiling = self.acceleration_ceiling(budget.arm);
-        let correct = |peak: f32, gain: f32| (peak * gain.max(1.0 / STEP)).min(ceiling);
-        self.bounds.accelerate = correct(up, speeding_gain);
-        self.bounds.brake = correct(down, braking_gain);
-        self.stage = Stage::Compose { round: round + 1 };
+                wanted,
+            }
+        } else {
+            Stage::Compose { round: round + 1 }
+        };
         Ok(())
     }
 

@@ -6,7 +6,7 @@ use protocol::messages::Refusal;
 use super::{Planner, ROUNDS, SURVEY_POINTS, Stage, fill};
 use crate::mechanics::math::{clamp, least};
 use crate::trajectory::path::{Path, check_limits};
-use crate::trajectory::profile::Bounds;
+use crate::trajectory::profile::{Bounds, HalfBounds};
 use crate::trajectory::request::from_ik;
 use crate::trajectory::torque_budget::TorqueBudget;
 
@@ -49,12 +49,13 @@ impl Planner {
         }
         // Of a robot that has such limits.
         let limits = &budget.arm.limits;
-        let ceiling = fill(&limits.acceleration, &fastest);
+        let jerk = fill(&limits.jerk, &fastest);
+        let half = HalfBounds::even(fill(&limits.acceleration, &fastest), jerk);
         self.bounds = Bounds {
             speed: fill(&budget.speed(), &fastest),
-            accelerate: ceiling,
-            brake: ceiling,
-            jerk: fill(&limits.jerk, &fastest),
+            jerk,
+            accelerate: half,
+            brake: half,
         };
         if self.bounds.speed == f32::MAX {
             // Nothing moves along the path: at most the lift of a jump does.
@@ -66,20 +67,23 @@ impl Planner {
         Ok(())
     }
 
-    /// What the torques and their rates allow an arm at rest at the beginning, in the middle and at the end of the path: the jerk,
-    /// and the accelerations for the first round.
+    /// What the torques and their rates allow an arm at rest at the beginning, in the middle and at the end of the path: the jerk
+    /// there, the least of which is that next to the peak speed, and the accelerations for the first round.
     #[inline(never)]
     pub(super) fn rest(&mut self, budget: &TorqueBudget<'_>, place: u8) -> Result<(), Refusal> {
         let here = self.point(budget.arm, 0.5 * f32::from(place))?;
         let (acceleration, jerk) = budget.from_rest(&here);
         let bounds = &mut self.bounds;
+        let half = |half: &HalfBounds| {
+            HalfBounds::even(least(half.slow, acceleration), least(half.jerk, jerk))
+        };
         bounds.jerk = least(bounds.jerk, jerk);
         self.stage = Stage::Rest { place: place + 1 };
         match place {
-            0 => bounds.accelerate = least(bounds.accelerate, acceleration),
+            0 => bounds.accelerate = half(&bounds.accelerate),
             1 => {}
             _ => {
-                bounds.brake = least(bounds.brake, acceleration);
+                bounds.brake = half(&bounds.brake);
                 self.stage = Stage::Compose { round: 0 };
             }
         }

@@ -3,17 +3,34 @@
 use super::*;
 use proptest::prelude::*;
 
+fn even(speed: f32, accelerate: f32, brake: f32, jerk: f32) -> Bounds {
+    Bounds {
+        speed,
+        jerk,
+        accelerate: HalfBounds::even(accelerate, jerk),
+        brake: HalfBounds::even(brake, jerk),
+    }
+}
+
 proptest! {
     /// The three derivatives, integrated in f64, reproduce the distance; no bound is exceeded.
     #[test]
     fn integrates_to_the_distance_within_bounds(
         distance in 0.01f32..6.0,
         speed in 0.05f32..30.0,
-        accelerate in 0.5f32..600.0,
-        ratio in 0.2f32..5.0,
-        jerk in 50.0f32..40_000.0,
+        accelerations in prop::array::uniform4(0.2f32..1.0),
+        most in 2.0f32..600.0,
+        jerks in prop::array::uniform3(0.3f32..1.0),
+        jerk in 100.0f32..40_000.0,
     ) {
-        let bounds = Bounds { speed, accelerate, brake: accelerate * ratio, jerk };
+        let [slow, fast, late, last] = accelerations.map(|share| share * most);
+        let [from_rest, peak, to_rest] = jerks.map(|share| share * jerk);
+        let bounds = Bounds {
+            speed,
+            jerk: peak,
+            accelerate: HalfBounds { jerk: from_rest, slow, fast },
+            brake: HalfBounds { jerk: to_rest, slow: last, fast: late },
+        };
         let curve = SCurve::new(distance, &bounds);
         let duration = curve.duration();
         let steps = 4000;
@@ -24,13 +41,13 @@ proptest! {
             let sample = curve.at(((f64::from(i) + 0.5) * h) as f32);
             s += f64::from(sample.v) * h;
             prop_assert!(sample.v >= -1e-5 && sample.v <= speed * 1.00001);
-            prop_assert!(sample.a <= accelerate * 1.00001);
-            prop_assert!(-sample.a <= accelerate * ratio * 1.00001);
+            prop_assert!(sample.a <= slow.max(fast) * 1.00001);
+            prop_assert!(-sample.a <= late.max(last) * 1.00001);
             // Accelerations of f32, each off by 4 u.
             // And of f32 times.
-            let noise = 8.0 * f32::EPSILON * accelerate * ratio.max(1.0)
-                + 2.0 * f32::EPSILON * duration * jerk;
-            prop_assert!((sample.a - before).abs() <= jerk * (h as f32) * 1.0001 + noise);
+            let noise = 8.0 * f32::EPSILON * most + 2.0 * f32::EPSILON * duration * jerk;
+            let allowed = from_rest.max(peak).max(to_rest) * (h as f32) * 1.0001;
+            prop_assert!((sample.a - before).abs() <= allowed + noise);
             before = sample.a;
         }
         // Midpoint rule: error below h^2/24 * T * max|a'| = jerk; plus f32 in the evaluation.
@@ -40,6 +57,31 @@ proptest! {
         prop_assert_eq!(curve.at(-1.0), Sample::default());
     }
 
+    /// It passes a place at the time that it tells, whatever it is bounded by.
+    #[test]
+    fn time_at_inverts_any_profile(
+        distance in 0.01f32..3.0,
+        speed in 0.5f32..30.0,
+        accelerations in prop::array::uniform4(0.2f32..1.0),
+        jerks in prop::array::uniform3(0.3f32..1.0),
+        share in 0.001f32..1.0,
+    ) {
+        let [slow, fast, late, last] = accelerations.map(|share| share * 300.0);
+        let [from_rest, peak, to_rest] = jerks.map(|share| share * 20_000.0);
+        let bounds = Bounds {
+            speed,
+            jerk: peak,
+            accelerate: HalfBounds { jerk: from_rest, slow, fast },
+            brake: HalfBounds { jerk: to_rest, slow: last, fast: late },
+        };
+        let curve = SCurve::new(distance, &bounds);
+        let s = share * distance;
+        let here = curve.at(curve.time_at(s));
+        // 8 u of the time at its speed, and of the place.
+        let slack = 8.0 * f32::EPSILON * (curve.duration() * here.v + distance);
+        prop_assert!((here.s - s).abs() <= slack, "{} {s}", here.s);
+    }
+
     /// Position is continuous across the segment borders: no jump larger than speed x step.
     #[test]
     fn is_continuous(
@@ -47,7 +89,7 @@ proptest! {
         accelerate in 0.5f32..600.0,
         jerk in 50.0f32..40_000.0,
     ) {
-        let bounds = Bounds { speed: 1e3, accelerate, brake: accelerate, jerk };
+        let bounds = even(1e3, accelerate, accelerate, jerk);
         let curve = SCurve::new(distance, &bounds);
         let h = curve.duration() / 1000.0;
         for i in 0..1000 {
@@ -62,12 +104,7 @@ proptest! {
 /// The jerk is constant between borders and changes at each. All eight are found, and no other.
 #[test]
 fn borders_are_where_the_jerk_changes() {
-    let bounds = Bounds {
-        speed: 2.0,
-        accelerate: 20.0,
-        brake: 30.0,
-        jerk: 1e3,
-    };
+    let bounds = even(2.0, 20.0, 30.0, 1e3);
     let curve = SCurve::new(1.0, &bounds);
     let mut t = -0.1;
     let borders = [(); 8].map(|()| {
@@ -96,30 +133,14 @@ fn borders_are_where_the_jerk_changes() {
 #[test]
 fn symmetric_triangle_has_the_textbook_duration() {
     // Without a speed limit and with jerk only: T = (32 s / j)^(1/3).
-    let curve = SCurve::new(
-        1.0,
-        &Bounds {
-            speed: 1e3,
-            accelerate: 1e6,
-            brake: 1e6,
-            jerk: 500.0,
-        },
-    );
+    let curve = SCurve::new(1.0, &even(1e3, 1e6, 1e6, 500.0));
     let expected = libm::cbrtf(32.0 / 500.0);
     assert!((curve.duration() / expected - 1.0).abs() < 1e-6);
 }
 
 #[test]
 fn time_at_inverts_the_profile() {
-    let curve = SCurve::new(
-        0.025,
-        &Bounds {
-            speed: 2.2,
-            accelerate: 55.0,
-            brake: 40.0,
-            jerk: 1e4,
-        },
-    );
+    let curve = SCurve::new(0.025, &even(2.2, 55.0, 40.0, 1e4));
     for i in 1..10 {
         let s = 0.0025 * i as f32;
         // At the peak speed of 1 m/s, 2^-14 of 50 ms.
