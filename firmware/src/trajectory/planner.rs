@@ -230,7 +230,7 @@ impl Planner {
                 Ok(())
             }
             Stage::Compose { round } => {
-                self.compose(round);
+                self.compose(budget.arm, round);
                 Ok(())
             }
             Stage::Balance {
@@ -299,9 +299,24 @@ impl Planner {
 
     /// Profile from the bounds.
     #[inline(never)]
-    fn compose(&mut self, round: u8) {
+    fn compose(&mut self, arm: &ArmModel, round: u8) {
         let travels = self.bounds.speed > 0.0;
         if travels {
+            // The joint acceleration limits as a limit along the path. They vary along a line: left to the last pass.
+            if let Path::Joint { delta, .. } = &self.draft.path {
+                let ceiling = fill(&arm.limits.acceleration, delta);
+                let Bounds {
+                    accelerate, brake, ..
+                } = &mut self.bounds;
+                for acceleration in [
+                    &mut accelerate.slow,
+                    &mut accelerate.fast,
+                    &mut brake.slow,
+                    &mut brake.fast,
+                ] {
+                    *acceleration = acceleration.min(ceiling);
+                }
+            }
             self.draft.profile = SCurve::new(1.0, &self.bounds);
         }
         self.draft.span = self.draft.profile.duration();

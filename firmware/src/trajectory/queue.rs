@@ -208,29 +208,28 @@ impl MoveQueue {
             stopping,
         } = *stride;
         let here = setpoint.reference.q;
-        if self.moves.is_empty() {
+        let Some(mut trajectory) = self.moves.front() else {
             *setpoint = Setpoint::rest(here);
             return Progress::Arrived;
-        }
+        };
         for _ in 0..steps {
             self.clock.advance(period);
         }
         let mut t = self.clock.time(period);
-        if !stopping
-            && self.moves.len() > 1
-            && let Some(last) = self.moves.front()
-            && t >= last.duration()
-        {
+        let mut duration = trajectory.duration();
+        if t >= duration && !stopping && self.moves.len() > 1 {
             // The next move begins where and when this one ends, within the sample.
-            t -= last.duration();
-            self.completed = last.sequence;
+            t -= duration;
+            self.completed = trajectory.sequence;
             self.moves.pop_front();
             self.clock = Clock::begun(self.pace(), t / period);
+            let Some(next) = self.moves.front() else {
+                return Progress::Arrived;
+            };
+            trajectory = next;
+            duration = next.duration();
         }
-        let Some(trajectory) = self.moves.front() else {
-            return Progress::Arrived;
-        };
-        let (sequence, ended) = (trajectory.sequence, t >= trajectory.duration());
+        let (sequence, ended) = (trajectory.sequence, t >= duration);
         let ahead = self.clock.lead(lead);
         if trajectory.follow(budget.arm, t, ahead, setpoint).is_err() {
             // A verified path stays in reach; should arithmetic disagree, the arm holds.

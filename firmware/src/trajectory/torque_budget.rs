@@ -9,7 +9,7 @@ use super::profile::{Bounds, HalfBounds, Sample};
 use crate::mechanics::arm::{ArmModel, Axis};
 use crate::mechanics::body::{Body, Torques};
 use crate::mechanics::kinematics::Trig;
-use crate::mechanics::math::{cbrt, clamp, least, sqrt};
+use crate::mechanics::math::{cbrt, clamp, least};
 
 /// Share of the torque that a plan may use. The rest is for feedback control: payload and friction are never known
 /// exactly, and a saturated axis leaves the path.
@@ -261,15 +261,15 @@ impl TorqueBudget<'_> {
         self.arm.limits.velocity.inf(&motor)
     }
 
-    /// Bounds of the vertical strokes of a jump, up and down, over at most `height` m. Friction takes from the force that speeds
-    /// up, and adds to the one that brakes.
+    /// Bounds of a vertical stroke of a jump, up or down, over at most `height` m. Friction takes from the force that speeds
+    /// up; it never adds to the one that brakes.
     #[inline(never)]
-    pub fn lift(&self, height: f32) -> (Bounds, Bounds) {
+    pub fn lift(&self, height: f32, down: bool) -> Bounds {
         let limits = &self.arm.limits;
         let mass = self.body.nominal_inertia.z;
-        let weight = -self.body.lagrange.gravity().z;
+        let gravity = self.body.lagrange.gravity().z;
         let force = self.torque_limits().z;
-        let cap = limits.acceleration.z.min((force + weight.abs()) / mass);
+        let cap = limits.acceleration.z.min((force + gravity.abs()) / mass);
         let coulomb = self.arm.drive.coulomb.z;
         let viscous = self.arm.drive.viscous.z;
         // Strokes that the drive cannot hold have been refused: this keeps the bound positive for one close to the
@@ -281,31 +281,28 @@ impl TorqueBudget<'_> {
             .jerk
             .z
             .min((rate - viscous * cap).max(0.1 * rate) / mass);
-        let stroke = |lifting: f32, braking: f32| {
-            let (lifting, braking) = (lifting - coulomb, braking + coulomb);
-            let (up, down) = (within(lifting), within(braking));
-            // The peak speed without ramps.
-            let peak = sqrt(2.0 * height * up * down / (up + down)).min(self.speed().z);
-            let lost = viscous * peak;
-            Bounds {
-                speed: self.speed().z,
+        // Gravity is negative: upwards is against it.
+        let weight = if down { gravity } else { -gravity };
+        let lifting = force - weight - coulomb;
+        let (up, back) = (within(lifting), within(force + weight));
+        // The peak speed without ramps, or a little more: from the greatest, by steps towards a square root.
+        let speed = self.speed().z;
+        let squared = 2.0 * height * up * back / (up + back);
+        let mut peak = speed;
+        for _ in 0..3 {
+            peak = peak.min(0.5 * (peak + squared / peak));
+        }
+        let lost = viscous * peak;
+        Bounds {
+            speed,
+            jerk,
+            accelerate: HalfBounds {
                 jerk,
-                accelerate: HalfBounds {
-                    jerk,
-                    slow: up,
-                    fast: within(lifting - lost),
-                },
-                brake: HalfBounds {
-                    jerk,
-                    slow: down,
-                    fast: within(braking + lost),
-                },
-            }
-        };
-        (
-            stroke(force - weight, force + weight),
-            stroke(force + weight, force - weight),
-        )
+                slow: up,
+                fast: within(lifting - lost),
+            },
+            brake: HalfBounds::even(back, jerk),
+        }
     }
 }
 

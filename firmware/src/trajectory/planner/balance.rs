@@ -2,10 +2,8 @@
 
 use protocol::messages::Refusal;
 
-use super::{BALANCE_POINTS, Planner, STEP, Stage, fill};
-use crate::mechanics::arm::ArmModel;
-use crate::mechanics::math::{clamp, least};
-use crate::trajectory::path::Path;
+use super::{BALANCE_POINTS, Planner, STEP, Stage};
+use crate::mechanics::math::clamp;
 use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Planner {
@@ -21,19 +19,16 @@ impl Planner {
     ) -> Result<(), Refusal> {
         let profile = &self.draft.profile;
         let braking = point >= BALANCE_POINTS;
-        let (slow, hold) = profile.hold(braking);
         let which = point % BALANCE_POINTS;
         let share = match which {
             0 => 0.0,
             1 => 1.0,
             _ => 0.5,
         };
-        let along = profile.at(slow + share * hold);
+        let along = profile.between_ramps(braking, share);
         let here = self.point(budget.arm, along.s)?;
         let room = budget.acceleration_room(&here, &along);
-        let ceiling = self.acceleration_ceiling(budget.arm);
-        let peak = along.a.abs();
-        let next = least(peak * clamp(room, 1.0 / STEP, STEP), ceiling);
+        let next = along.a.abs() * clamp(room, 1.0 / STEP, STEP);
         let [slow, fast] = wanted;
         let wanted = match which {
             0 => [next, fast],
@@ -60,14 +55,5 @@ impl Planner {
             Stage::Compose { round: round + 1 }
         };
         Ok(())
-    }
-
-    /// The joint acceleration limits as a limit along the path.
-    fn acceleration_ceiling(&self, arm: &ArmModel) -> f32 {
-        match &self.draft.path {
-            Path::Joint { delta, .. } => fill(&arm.limits.acceleration, delta),
-            // Varies along a line: left to the last pass.
-            Path::Line { .. } => f32::MAX,
-        }
     }
 }

@@ -125,15 +125,15 @@ impl Jump {
     #[inline(never)]
     fn bounds(&self, budget: &TorqueBudget<'_>, down: bool) -> Bounds {
         let highest = self.gate.rise.max(self.gate.fall) + self.raise;
-        let (up, descent) = budget.lift(highest);
+        let bounds = budget.lift(highest, down);
         if down {
             Bounds {
-                accelerate: descent.brake,
-                brake: descent.accelerate,
-                ..descent
+                accelerate: bounds.brake,
+                brake: bounds.accelerate,
+                ..bounds
             }
         } else {
-            up
+            bounds
         }
     }
 }

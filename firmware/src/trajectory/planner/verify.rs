@@ -18,7 +18,7 @@ pub(super) const LINE_STEPS: u8 = 24;
 /// Share of the limits of speed, acceleration and jerk that the samples of a line may use: there is more between them.
 const LINE_SHARE: f32 = 0.9;
 /// The same for torque rates, of which the samples show the mean over a step.
-const LINE_RATE: f32 = 0.97;
+const LINE_RATE: f32 = 0.94;
 
 /// Further share of those of acceleration and jerk, of a robot that has them.
 const CAP_SHARE: f32 = 0.95;

@@ -3,6 +3,8 @@
 use super::{HalfBounds, Sample};
 use crate::mechanics::math::{cbrt, sqrt};
 
+const THIRD: f32 = 1.0 / 3.0;
+
 /// Where both halves meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Peak {
@@ -11,18 +13,21 @@ pub(super) struct Peak {
     pub(super) jerk: f32,
 }
 
-/// How the distance of one half grows with its peak speed. In the root w of that speed all distances are polynomials.
+/// How the distance of one half grows with its peak speed. All distances are polynomials in m, the peak acceleration that ramps of the
+/// peak's jerk alone would need: the speed is m²/jerk.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Growth {
     bounds: HalfBounds,
-    /// Jerk next to the peak.
-    jerk: f32,
-    /// Up to this w the acceleration is a triangle, whose apex is `apex` times w and whose distance `cubic` times w³.
+    /// Reciprocal of the jerk next to the peak.
+    per_jerk: f32,
+    /// Up to this m the acceleration is a triangle, whose apex is `apex` times m and whose distance `cubic` times m³.
     triangle: f32,
     apex: f32,
     pub(super) cubic: f32,
     /// Above it, the speed that the ramps alone lead to, and the distance as a polynomial of the time between them.
     ramps: f32,
+    /// Time between the ramps for each unit of speed above that.
+    hold: f32,
     distance: [f32; 3],
 }
 
@@ -33,17 +38,24 @@ impl Growth {
             slow,
             fast,
         } = *bounds;
-        let apex = sqrt(2.0 * own * jerk / (own + jerk));
+        // The root of what is between 1 and 2 where the jerk next to rest is the higher one, as it is in a plan: four steps from there
+        // leave nothing, down to a third of it.
+        let squared = 2.0 * own / (own + jerk);
+        let mut apex = 1.2;
+        for _ in 0..4 {
+            apex = 0.5 * (apex + squared / apex);
+        }
         let (ramp, fall) = (slow / own, fast / jerk);
         let speed = 0.5 * slow * ramp;
         let (up, down) = (apex / own, apex / jerk);
         Self {
             bounds: *bounds,
-            jerk,
+            per_jerk: 1.0 / jerk,
             triangle: slow.max(fast) / apex,
             apex,
             cubic: apex * (up * (up / 6.0 + 0.5 * down) + down * down / 3.0),
             ramps: speed + 0.5 * fast * fall,
+            hold: 2.0 / (slow + fast),
             distance: [
                 speed * (ramp / 3.0 + fall) + fast * fall * fall / 3.0,
                 speed + 0.5 * (slow + fast) * fall,
@@ -52,59 +64,62 @@ impl Growth {
         }
     }
 
-    /// Time between the ramps, and its slope over the speed.
-    fn hold(&self, w: f32) -> (f32, f32) {
-        let slope = 2.0 / (self.bounds.slow + self.bounds.fast);
-        ((w * w - self.ramps) * slope, slope)
+    /// Distance of the half with a peak speed above the triangle's, and its slope.
+    fn long(&self, speed: f32) -> (f32, f32) {
+        let hold = (speed - self.ramps) * self.hold;
+        let [constant, linear, square] = self.distance;
+        (
+            constant + hold * (linear + hold * square),
+            (linear + 2.0 * hold * square) * self.hold,
+        )
     }
 
-    /// Distance and its derivative with respect to w: no root in either.
-    pub(super) fn distance_and_slope(&self, w: f32) -> (f32, f32) {
-        if w < self.triangle {
-            let squared = self.cubic * w * w;
-            (squared * w, 3.0 * squared)
+    /// Distance and its derivative with respect to m: no root in either.
+    pub(super) fn distance_and_slope(&self, m: f32) -> (f32, f32) {
+        if m < self.triangle {
+            let squared = self.cubic * m * m;
+            (squared * m, 3.0 * squared)
         } else {
-            let (hold, slope) = self.hold(w);
-            let [constant, linear, square] = self.distance;
-            (
-                constant + hold * (linear + hold * square),
-                (linear + 2.0 * hold * square) * slope * 2.0 * w,
-            )
+            let slow = m * self.per_jerk;
+            let (distance, slope) = self.long(m * slow);
+            (distance, 2.0 * slope * slow)
         }
     }
 
-    /// What the distance over w⁴ would be if the ramps took no time.
+    /// What the distance over m⁴ would be if the ramps took no time.
     pub(super) fn unramped(&self) -> f32 {
-        let HalfBounds { slow, fast, .. } = self.bounds;
-        let sum = slow + fast;
-        (2.0 / 3.0) * (slow + sum) / (sum * sum)
+        let ratio = self.hold * self.per_jerk;
+        self.distance[2] * ratio * ratio
     }
 
-    /// The half with this peak.
-    pub(super) fn half(&self, w: f32) -> Half {
+    /// The half with this m.
+    pub(super) fn half(&self, m: f32) -> Half {
         let HalfBounds { jerk, slow, fast } = self.bounds;
-        let (distance, _) = self.distance_and_slope(w);
-        if w < self.triangle {
-            let apex = self.apex * w;
-            Half {
+        if m < self.triangle {
+            let apex = self.apex * m;
+            return Half {
                 jerk,
                 ramp: apex / jerk,
                 hold: 0.0,
                 bend: 0.0,
-                fall: apex / self.jerk,
-                distance,
-            }
-        } else {
-            let (hold, _) = self.hold(w);
-            let change = fast - slow;
-            Half {
-                jerk,
-                ramp: slow / jerk,
-                hold,
-                bend: if hold > 0.0 { change / hold } else { 0.0 },
-                fall: fast / self.jerk,
-                distance,
-            }
+                fall: apex * self.per_jerk,
+                distance: self.cubic * m * m * m,
+            };
+        }
+        let speed = m * m * self.per_jerk;
+        let hold = (speed - self.ramps) * self.hold;
+        let (distance, _) = self.long(speed);
+        Half {
+            jerk,
+            ramp: slow / jerk,
+            hold,
+            bend: if hold > 0.0 {
+                (fast - slow) / hold
+            } else {
+                0.0
+            },
+            fall: fast * self.per_jerk,
+            distance,
         }
     }
 }
@@ -132,13 +147,12 @@ impl Half {
 
     /// At the end of the first segment.
     fn ramped(&self) -> Sample {
-        let a = self.jerk * self.ramp;
-        let v = 0.5 * a * self.ramp;
-        Sample {
-            s: v * self.ramp / 3.0,
-            v,
-            a,
-        }
+        from_rest(self.jerk, self.ramp)
+    }
+
+    /// Motion so long after the end of the first segment, up to the beginning of the last.
+    pub(super) fn held(&self, since: f32) -> Sample {
+        self.ramped().after(since, self.bend)
     }
 
     /// Time at which the half, from rest, has come as far as `s`, at most its distance.
@@ -172,20 +186,32 @@ impl Half {
     /// Motion at `t` in `0..=duration`, from rest.
     pub(super) fn at(&self, peak: &Peak, t: f32) -> Sample {
         if t < self.ramp {
-            return Sample::default().after(t, self.jerk);
+            return from_rest(self.jerk, t);
         }
         let since = t - self.ramp;
         if since < self.hold {
-            return self.ramped().after(since, self.bend);
+            return self.held(since);
         }
         let left = (self.hold + self.fall - since).max(0.0);
-        let a = peak.jerk * left;
-        let lost = 0.5 * a * left;
+        // What is missing to even motion is the same motion from rest.
+        let lost = from_rest(peak.jerk, left);
         Sample {
-            s: self.distance - left * (peak.speed - lost / 3.0),
-            v: peak.speed - lost,
-            a,
+            s: self.distance - left * peak.speed + lost.s,
+            v: peak.speed - lost.v,
+            a: lost.a,
         }
+    }
+}
+
+/// `t` seconds after rest, with this jerk.
+#[inline(always)]
+fn from_rest(jerk: f32, t: f32) -> Sample {
+    let a = jerk * t;
+    let v = 0.5 * a * t;
+    Sample {
+        s: v * t * THIRD,
+        v,
+        a,
     }
 }
 
@@ -195,7 +221,7 @@ impl Sample {
     fn after(&self, t: f32, jerk: f32) -> Self {
         let gain = jerk * t;
         Self {
-            s: self.s + t * (self.v + t * (0.5 * self.a + gain / 6.0)),
+            s: self.s + t * (self.v + t * (0.5 * self.a + gain * (0.5 * THIRD))),
             v: self.v + t * (self.a + 0.5 * gain),
             a: self.a + gain,
         }
