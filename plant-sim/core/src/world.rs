@@ -6,6 +6,7 @@ use firmware::node::Node;
 use protocol::messages::{Fault, Mode, MotionRequest, Refusal};
 use protocol::time::{Duration, Instant};
 
+use crate::drives::BrokenClock;
 use crate::model::Payload;
 use crate::plant::Plant;
 use crate::refusal::sentence;
@@ -17,6 +18,8 @@ pub struct World {
     pub plant: Plant,
     /// The controller's intention.
     pub mind: Mind,
+    /// The clock by which the drives take their samples; `None` while it is sound.
+    pub clock: Option<BrokenClock>,
     /// Events in the cell during this call.
     pub cell_events: Vec<CellEvent>,
     /// Outcome of the operator's scenario, once it has ended.
@@ -32,6 +35,8 @@ pub struct Mind {
     pub qd: [f64; 4],
     /// State of the cabinet.
     pub mode: Mode,
+    /// Sequence number of the move under way.
+    pub under_way: Option<u8>,
 }
 
 impl Mind {
@@ -40,6 +45,7 @@ impl Mind {
         q: [0.0; 4],
         qd: [0.0; 4],
         mode: Mode::Boot,
+        under_way: None,
     };
 
     /// The intention of this node.
@@ -50,6 +56,7 @@ impl Mind {
             q: four(&controller.reference().q),
             qd: four(&controller.reference().qd),
             mode: controller.mode(),
+            under_way: controller.under_way(),
         }
     }
 }
