@@ -50,6 +50,8 @@ pub struct Drives {
     period: Period,
     /// Sample that the last command echoed.
     answered: Option<u32>,
+    /// Time of that command.
+    commanded: Instant,
     control: ControlWord,
     /// Whether they have switched off by themselves, and no command has let go of torque since.
     let_down: bool,
@@ -75,6 +77,7 @@ impl Drives {
             train,
             period,
             answered: None,
+            commanded: Instant::ORIGIN,
             control: ControlWord::EMPTY,
             let_down: false,
         }
@@ -124,12 +127,13 @@ impl Drives {
     }
 
     /// Takes a command that has just arrived. A damaged or old one is ignored.
-    fn receive(&mut self, frame: &CanFrame, plant: &mut Plant) {
+    fn receive(&mut self, now: Instant, frame: &CanFrame, plant: &mut Plant) {
         if let Ok(received) = codec::decode(frame)
             && let Message::Command(command) = received.message
             && self.age(command.sample) <= self.settings.hold_samples()
             && self.commands.check(received.counter.unwrap_or(0)).is_new()
         {
+            self.commanded = now;
             self.apply(&command, plant);
         }
     }
@@ -205,13 +209,26 @@ impl Drives {
             return;
         };
         if self.age(answered) > self.settings.hold_samples() {
-            self.let_down |= self.control.contains(ControlWord::TORQUE_ENABLE);
-            plant.set_brake(true);
-            plant.set_torque_enabled(false);
-            self.control = ControlWord::EMPTY;
-            self.commands.reset();
-            self.requests.reset();
+            self.let_go(plant);
         }
+    }
+
+    /// The same by a clock of its own, when that of the samples stands still.
+    fn watchdog(&mut self, now: Instant, plant: &mut Plant) {
+        let held = self.period.duration() * (self.settings.hold_samples() + 1);
+        if self.answered.is_some() && now.since(self.commanded) > held {
+            plant.advance_to(now.nanos());
+            self.let_go(plant);
+        }
+    }
+
+    fn let_go(&mut self, plant: &mut Plant) {
+        self.let_down |= self.control.contains(ControlWord::TORQUE_ENABLE);
+        plant.set_brake(true);
+        plant.set_torque_enabled(false);
+        self.control = ControlWord::EMPTY;
+        self.commands.reset();
+        self.requests.reset();
     }
 }
 
@@ -232,14 +249,16 @@ impl Peer for Drives {
             None => {
                 let period = self.period.duration();
                 self.next = now + BrokenClock::tick(&world.clock, period);
-                if !BrokenClock::misses(&mut world.clock) {
+                if BrokenClock::misses(&mut world.clock) {
+                    self.watchdog(now, plant);
+                } else {
                     plant.advance_to(now.nanos());
                     out.push((now, self.feedback(plant)));
                 }
             }
             Some(frame) if table::COMMAND.identifies(frame) => {
                 plant.advance_to(now.nanos());
-                self.receive(frame, plant);
+                self.receive(now, frame, plant);
             }
             Some(frame) if table::DRIVES_PARAMETER_REQUEST.identifies(frame) => {
                 out.extend(self.answer(frame).map(|answer| (now, answer)));

@@ -141,6 +141,12 @@ pub enum OperatorError {
         /// Time of its last frame.
         since: Instant,
     },
+    /// The controller has started anew, and knows nothing of the move that it was asked for.
+    #[error("the controller has started anew: it went to {mode} without a stop")]
+    Restarted {
+        /// State it is in.
+        mode: Mode,
+    },
     /// The peers were built from different message tables.
     #[error(
         "the controller uses schema {theirs:08x}, this program {ours:08x}; build both from the same source"

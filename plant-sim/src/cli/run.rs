@@ -76,6 +76,7 @@ pub(super) fn run(scenario: &str, args: &RunArgs) -> Result<(), Failure> {
     let place = args.place.place()?;
     let config = args.config.config(scenario)?;
     // Everything that can be refused is, before the folder is touched.
+    place.admit(&config.scenario.faults)?;
     config.rig().map_err(Failure::usage)?;
     let results = run::results(&args.out);
     let outputs = results.iter().chain(&args.mcap).map(PathBuf::as_path);

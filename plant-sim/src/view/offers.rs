@@ -8,6 +8,8 @@ use sim::model::{AXES, RobotModel};
 use sim::scenario::{Scenario, Step};
 use sim::selection::LawChoice;
 
+use super::wish::MOMENTS;
+
 /// Controls and buttons that belong together.
 #[derive(Debug, Serialize)]
 pub struct Group {
@@ -180,16 +182,21 @@ pub fn of_run(scenario: &Scenario, robot: &RobotModel) -> Vec<Group> {
                     label: "Fault",
                     kind: FieldKind::Fault { faults: faults() },
                 },
+                choice("when", "When", moments(), "at once"),
                 number(
                     "seconds",
-                    "Lasts (0: it stays)",
+                    "Lasts (0: as long as that, or it stays)",
                     [0.0, 3600.0],
                     0.1,
                     0.0,
                     "s",
                 ),
             ],
-            buttons: vec![button("Plant the fault", "fault", &["fault", "seconds"])],
+            buttons: vec![button(
+                "Plant the fault",
+                "fault",
+                &["fault", "when", "seconds"],
+            )],
         },
     ]
 }
@@ -281,6 +288,11 @@ fn laws() -> Vec<String> {
     all.collect()
 }
 
+/// When a fault can begin.
+fn moments() -> Vec<String> {
+    MOMENTS.iter().map(|(name, _)| (*name).to_owned()).collect()
+}
+
 /// Every kind of fault at every place that has it.
 fn faults() -> Vec<Breakage> {
     let kinds = KINDS.iter().flat_map(|kind| {
@@ -306,7 +318,12 @@ fn faults() -> Vec<Breakage> {
 fn places(kind: &Kind) -> Vec<String> {
     match kind.place {
         "message" => TABLE.iter().map(|info| info.name.to_lowercase()).collect(),
-        "node" => Node::ALL.iter().map(ToString::to_string).collect(),
+        // An operator does not start anew.
+        "node" => (Node::ALL
+            .iter()
+            .filter(|node| kind.name != "dead" || **node != Node::Operator))
+        .map(ToString::to_string)
+        .collect(),
         part if kind.has_axis => AXES.iter().map(|axis| format!("{part}:{axis}")).collect(),
         part => vec![part.to_owned()],
     }

@@ -18,6 +18,7 @@
 //! | the same for 9 samples or more | 8 samples | nothing gets through |
 //! | drives or controller without power for 9 samples or more | 8 samples | as if they were silent: they start with torque off |
 //! | a drive without power for 2 samples or more | 4 samples | the next feedback says so, and one sample to answer |
+//! | the clock of the drives stands still for 9 samples or more | 8 samples | no feedback, so no commands: the drives let go by a clock of their own |
 //! | a clock within 100 ppm, as every crystal is | the same as without it | nobody else counts on a time |
 //! | nobody tells a CAN controller to recover | the same as without it | nothing by itself: only after a bus-off |
 //!
@@ -84,6 +85,7 @@ fn of(fault: &Spell, period: Period) -> Expected {
         What::Silent(Node::Controller) | What::Dead(_) => no_survival(by_length(0, 9, 8)),
         What::Babbling(_) | What::Wires(_) => by_length(2, 9, 8),
         What::Motor(_, MotorDefect::Dip) => no_survival(by_length(0, 2, 4)),
+        What::Clock(ClockDefect::Misses(1.0)) => no_survival(by_length(0, 9, 8)),
         What::Clock(ClockDefect::Drift(share)) if share.abs() <= SOUND_CLOCK => Expected::Survived,
         What::Frames(info, kind) => match (info.content, kind) {
             (_, FrameFault::Duplicate) => Expected::Survived,
@@ -152,15 +154,11 @@ pub(super) fn is_taken(period: Period) -> Duration {
     period.duration() * (HOLD_SAMPLES + 1)
 }
 
-/// Causes that leave the loops to be trusted: the brake has closed before torque goes off.
+/// Causes that leave the loops to be trusted: the arm has stopped before the brake closes, and the brake has closed before torque goes
+/// off. A drive in fault gets the brake at once, which may still have to stop the lift when torque goes off.
 pub(super) fn stops_under_control(cause: Cause) -> bool {
     matches!(
         cause,
-        Cause::FeedbackLost
-            | Cause::Reordered
-            | Cause::Corrupted
-            | Cause::SoftLimit
-            | Cause::EStop
-            | Cause::DriveFault
+        Cause::FeedbackLost | Cause::Reordered | Cause::Corrupted | Cause::SoftLimit | Cause::EStop
     )
 }

@@ -197,6 +197,14 @@ impl Judge {
         }
     }
 
+    /// Whether the controller knows where the arm is meant to be.
+    fn has_started(&self) -> bool {
+        !matches!(
+            self.mode,
+            Mode::Boot | Mode::SelfTest | Mode::PreOperational
+        )
+    }
+
     fn miss(&mut self, requirement: Requirement) {
         self.missed.insert(requirement);
     }
@@ -359,7 +367,7 @@ impl Observer for Judge {
         {
             self.cut.get_or_insert(plant.t);
         }
-        if is_powered && !self.is_detected() {
+        if is_powered && !self.is_detected() && self.has_started() {
             self.watch_limits(truth);
         }
         let now = Instant::ORIGIN + Duration::from_seconds(plant.t);
@@ -376,7 +384,7 @@ impl Observer for Judge {
         }
         if let Some(rest) = &self.rest {
             let moved = (0..4).any(|i| (plant.q[i] - rest.q[i]).abs() > STANDING);
-            if moved {
+            if moved && !self.faults.move_the_arm() {
                 self.missed.insert(Requirement::Still);
             }
         }

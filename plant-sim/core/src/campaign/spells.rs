@@ -87,6 +87,12 @@ impl Spells {
         self.any(|what| matches!(what, What::Load(LoadDefect::Caught(_))))
     }
 
+    /// Whether something may move an arm without torque: a spring, or the weight of a lift that nothing holds.
+    pub(super) fn move_the_arm(&self) -> bool {
+        let opens = |what| matches!(what, What::Brake(BrakeDefect::StuckOpen));
+        self.catch_the_tool() || self.any(opens)
+    }
+
     /// The most that may be at the flange, with this payload.
     pub(super) fn burden(&self, payload: Option<Payload>) -> Option<Payload> {
         let extra = self.all.iter().map(|spell| match spell.what {
