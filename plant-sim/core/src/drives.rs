@@ -5,7 +5,6 @@
 //! for want of commands, they take torque only to stop the arm while their brake closes, and then none until a command has let
 //! go of it: one that was on its way knows nothing of that, and an arm that stands is not to move again.
 
-mod clock;
 mod settings;
 
 use protocol::codec::{self, Encoder};
@@ -19,11 +18,11 @@ use protocol::parameters::{self, DriveParameter};
 use protocol::table;
 use protocol::time::{Instant, Period};
 
+use crate::clock::BrokenClock;
 use crate::model::{DriveTrain, RobotModel};
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::plant::Plant;
 use crate::world::World;
-pub use clock::{BrokenClock, ClockDefect};
 use settings::Settings;
 
 /// Default number of samples for which the last command is held without a new one.

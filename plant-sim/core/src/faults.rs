@@ -37,7 +37,7 @@ pub(crate) use watch::{Sense, Watch};
 pub use window::{Activity, End, Episode, Moment, Span, Window};
 
 use crate::bus::{ErrorKind, Level};
-use crate::drives::ClockDefect;
+use crate::clock::ClockDefect;
 use crate::plant::defect::{BrakeDefect, EncoderDefect, LoadDefect, MotorDefect};
 
 /// A planned fault.

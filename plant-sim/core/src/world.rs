@@ -6,7 +6,7 @@ use firmware::node::Node;
 use protocol::messages::{Fault, Mode, MotionRequest, Refusal};
 use protocol::time::{Duration, Instant};
 
-use crate::drives::BrokenClock;
+use crate::clock::BrokenClock;
 use crate::model::Payload;
 use crate::plant::Plant;
 use crate::refusal::sentence;
@@ -47,6 +47,14 @@ impl Mind {
         mode: Mode::Boot,
         under_way: None,
     };
+
+    /// Whether there is a reference: a controller that has just started has none.
+    pub fn knows_where(&self) -> bool {
+        !matches!(
+            self.mode,
+            Mode::Boot | Mode::SelfTest | Mode::PreOperational
+        )
+    }
 
     /// The intention of this node.
     pub fn of(node: &Node) -> Self {

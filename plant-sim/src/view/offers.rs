@@ -182,7 +182,12 @@ pub fn of_run(scenario: &Scenario, robot: &RobotModel) -> Vec<Group> {
                     label: "Fault",
                     kind: FieldKind::Fault { faults: faults() },
                 },
-                choice("when", "When", moments(), "at once"),
+                choice(
+                    "when",
+                    "When",
+                    MOMENTS.map(|(name, _)| name.into()).into(),
+                    "at once",
+                ),
                 number(
                     "seconds",
                     "Lasts (0: as long as that, or it stays)",
@@ -288,11 +293,6 @@ fn laws() -> Vec<String> {
     all.collect()
 }
 
-/// When a fault can begin.
-fn moments() -> Vec<String> {
-    MOMENTS.iter().map(|(name, _)| (*name).to_owned()).collect()
-}
-
 /// Every kind of fault at every place that has it.
 fn faults() -> Vec<Breakage> {
     let kinds = KINDS.iter().flat_map(|kind| {
@@ -310,7 +310,8 @@ fn faults() -> Vec<Breakage> {
             }),
         })
     });
-    let mut all: Vec<Breakage> = kinds.collect();
+    // An operator does not start anew.
+    let mut all: Vec<Breakage> = kinds.filter(|it| it.text != "operator:dead").collect();
     all.sort_by(|one, other| one.place.cmp(&other.place));
     all
 }
@@ -318,12 +319,7 @@ fn faults() -> Vec<Breakage> {
 fn places(kind: &Kind) -> Vec<String> {
     match kind.place {
         "message" => TABLE.iter().map(|info| info.name.to_lowercase()).collect(),
-        // An operator does not start anew.
-        "node" => (Node::ALL
-            .iter()
-            .filter(|node| kind.name != "dead" || **node != Node::Operator))
-        .map(ToString::to_string)
-        .collect(),
+        "node" => Node::ALL.iter().map(ToString::to_string).collect(),
         part if kind.has_axis => AXES.iter().map(|axis| format!("{part}:{axis}")).collect(),
         part => vec![part.to_owned()],
     }

@@ -31,7 +31,7 @@ use protocol::time::{Duration, Instant, Period};
 use super::bounds::FOLLOWING_ERROR;
 use super::spells::Spell;
 use crate::bus::ErrorKind;
-use crate::drives::ClockDefect;
+use crate::clock::ClockDefect;
 use crate::faults::{FrameFault, What};
 use crate::plant::defect::{EncoderDefect, MotorDefect};
 

@@ -117,7 +117,7 @@ impl Judge {
         judge
     }
 
-    /// What is to be expected, as far as the times of the faults are known.
+    /// What to expect, as far as the times of the faults are known.
     fn look_forward(&mut self) {
         self.onset = self.onset.min(self.faults.onset());
         self.expected = self.faults.expected();
@@ -195,14 +195,6 @@ impl Judge {
             drop_mm: stopped.then(|| round(self.lift.drop() * 1e3)),
             missed: self.missed,
         }
-    }
-
-    /// Whether the controller knows where the arm is meant to be.
-    fn has_started(&self) -> bool {
-        !matches!(
-            self.mode,
-            Mode::Boot | Mode::SelfTest | Mode::PreOperational
-        )
     }
 
     fn miss(&mut self, requirement: Requirement) {
@@ -367,7 +359,7 @@ impl Observer for Judge {
         {
             self.cut.get_or_insert(plant.t);
         }
-        if is_powered && !self.is_detected() && self.has_started() {
+        if is_powered && !self.is_detected() && truth.mind.knows_where() {
             self.watch_limits(truth);
         }
         let now = Instant::ORIGIN + Duration::from_seconds(plant.t);

@@ -7,7 +7,7 @@ use protocol::table::TABLE;
 use super::kinds::{KINDS, Kind, Value};
 use super::{Disguise, Fault, FrameFault, What, Window};
 use crate::bus::{ErrorKind, Level};
-use crate::drives::ClockDefect;
+use crate::clock::ClockDefect;
 use crate::model::AXES;
 use crate::plant::defect::{BrakeDefect, EncoderDefect, LoadDefect, MotorDefect};
 use crate::text::allowed;

@@ -31,7 +31,7 @@ pub struct BrokenClock {
 
 impl BrokenClock {
     /// Time until the next tick, of which there is one a `period` while `clock` is sound.
-    pub(super) fn tick(clock: &Option<Self>, period: Duration) -> Duration {
+    pub(crate) fn tick(clock: &Option<Self>, period: Duration) -> Duration {
         match clock {
             Some(Self {
                 defect: ClockDefect::Drift(share),
@@ -42,7 +42,7 @@ impl BrokenClock {
     }
 
     /// Whether the present tick is lost.
-    pub(super) fn misses(clock: &mut Option<Self>) -> bool {
+    pub(crate) fn misses(clock: &mut Option<Self>) -> bool {
         match clock {
             Some(Self {
                 defect: ClockDefect::Misses(share),
