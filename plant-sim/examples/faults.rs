@@ -8,7 +8,7 @@
     reason = "an example or a benchmark of the built-in files"
 )]
 
-use sim::faults::{KINDS, Kind};
+use sim::faults::{KINDS, Kind, Value};
 
 fn main() {
     println!("| fault | value | effect |");
@@ -18,6 +18,7 @@ fn main() {
         has_axis,
         name,
         value,
+        second,
         about,
     } in KINDS
     {
@@ -27,15 +28,19 @@ fn main() {
             place => place,
         };
         let axis = if has_axis { ":AXIS" } else { "" };
-        let value = value.map_or_else(String::new, |value| {
-            let otherwise = value
-                .default
-                .map_or_else(String::new, |default| format!("; {default} if left out"));
-            format!(
-                "{} to {} {}{otherwise}",
-                value.least, value.greatest, value.unit
-            )
-        });
+        let value = value.into_iter().chain(second).map(text);
+        let value = value.collect::<Vec<_>>().join(" / ");
         println!("| `{place}{axis}:{name}` | {value} | {about} |");
     }
+}
+
+fn text(value: Value) -> String {
+    let Value {
+        least,
+        greatest,
+        unit,
+        default,
+    } = value;
+    let otherwise = default.map_or_else(String::new, |default| format!("; {default} if left out"));
+    format!("{least} to {greatest} {unit}{otherwise}")
 }

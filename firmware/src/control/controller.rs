@@ -219,6 +219,11 @@ impl Controller {
         self.queue.pace_now()
     }
 
+    /// Number of the move under way, or about to begin.
+    pub fn under_way(&self) -> Option<u8> {
+        self.queue.under_way()
+    }
+
     /// Number of the last move that was completed.
     pub fn completed(&self) -> u8 {
         self.queue.completed()

@@ -100,6 +100,11 @@ impl MoveQueue {
         self.completed
     }
 
+    /// Number of the move under way, or about to begin.
+    pub fn under_way(&self) -> Option<u8> {
+        self.moves.front().map(|trajectory| trajectory.sequence)
+    }
+
     /// Share of its planned speed at which a move passes, once it has got there.
     pub fn pace(&self) -> f32 {
         self.asked.min(self.found)

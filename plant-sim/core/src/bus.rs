@@ -3,17 +3,19 @@
 //! Time is an argument. The bus never runs by itself: the caller queues frames with [`BuiltinBus::enqueue`], gets the
 //! time of the next event from [`BuiltinBus::next_event`], and takes received frames with [`BuiltinBus::pop_delivery`].
 //!
-//! Modelled: exact frame lengths, arbitration bit by bit, non-preemption, interframe space, transmit mailboxes,
-//! identifier collisions; errors of ISO 11898-1 with error frames, error counters, retransmission, bus-off and recovery,
-//! where a [`Disturbance`] causes them or nobody acknowledges. Not modelled: propagation delay, oscillator tolerance,
-//! overload frames, disturbed error flags. What goes wrong inside a node is injected by wrappers around its
+//! Modelled: exact frame lengths, arbitration bit by bit, non-preemption, interframe space, transmit mailboxes; errors of
+//! ISO 11898-1 with error frames, error counters, retransmission, bus-off and recovery, where a [`Disturbance`] or an
+//! [`Affliction`] causes them, two nodes send different frames of one identifier, or nobody acknowledges. Not modelled:
+//! propagation delay, oscillator tolerance, overload frames. What goes wrong inside a node is injected by wrappers around its
 //! [`Peer`](crate::peer::Peer).
 
+mod affliction;
 mod anatomy;
 mod counters;
 mod course;
 mod disturbance;
 mod foresight;
+mod held;
 mod load;
 mod node;
 mod nodes;
@@ -22,21 +24,24 @@ mod settle;
 mod statistics;
 
 use protocol::bus::TransmitError;
-use protocol::frame::CanFrame;
+use protocol::frame::{CanFrame, StandardId};
 use protocol::time::{Duration, Instant};
 use protocol::wire::{BitTiming, FrameBits, arbitration_field};
 
+use affliction::Afflictions;
 use disturbance::Interference;
 use foresight::{Next, Transmission};
+use held::Held;
 use node::{Mailbox, Node, OCCURRENCE};
 
+pub use affliction::{Affliction, Level};
 pub use anatomy::Field;
 pub use counters::{Counters, Rule, State};
 pub use disturbance::{Disturbance, Disturbed, ErrorKind};
 pub use load::{MAX_LOAD, Overload, Traffic, admit, worst_case_load};
 pub use nodes::{NodeId, NodeSet};
 pub use report::{Noticed, Report};
-pub use statistics::{Carried, Collision, Statistics};
+pub use statistics::{Carried, Statistics};
 
 /// A frame that has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +73,11 @@ pub struct BuiltinBus {
     /// End of the last intermission; no frame starts earlier.
     idle: Instant,
     interference: Interference,
+    afflictions: Afflictions,
+    /// While the bus is dominant where it should not be.
+    held: Option<Held>,
+    /// What a babbling node sends.
+    babble: Mailbox,
     /// What happens next, renewed by whatever can change it.
     next: Option<Next>,
     reports: Vec<Report>,
@@ -91,6 +101,9 @@ impl BuiltinBus {
             nodes: Vec::new(),
             idle: Instant::ORIGIN,
             interference: Interference::default(),
+            afflictions: Afflictions::default(),
+            held: None,
+            babble: babble(&timing),
             next: None,
             reports: Vec::new(),
             statistics: Statistics::default(),
@@ -126,17 +139,33 @@ impl BuiltinBus {
     }
 
     /// Adds a disturbance, with random numbers from `seed`.
-    pub fn disturb(&mut self, disturbance: Disturbance, seed: u64) {
-        self.interference.add(disturbance, seed);
+    pub fn disturb(&mut self, disturbance: Disturbance, seed: u64) -> Wrong {
+        let number = self.interference.add(disturbance, seed);
         self.next = self.foreseen();
+        Wrong::Disturbance(number)
     }
 
-    /// From `from` until `until` nobody tells the controller of this node to recover once it is bus-off.
+    /// Adds something that is so from `from` until `until`.
+    pub fn afflict(&mut self, what: Affliction, from: Instant, until: Instant) -> Wrong {
+        let number = self.afflictions.add(what, from, until);
+        self.next = self.foreseen();
+        Wrong::Affliction(number)
+    }
+
+    /// Gives something that is wrong another time, of which nothing that changes has passed.
     ///
     /// # Panics
-    /// With a node of another bus.
-    pub fn leave_off(&mut self, node: NodeId, from: Instant, until: Instant) {
-        self.nodes[node.0].unattended.push((from, until));
+    /// With something of another bus.
+    pub fn retime(&mut self, what: Wrong, from: Instant, until: Instant) {
+        match what {
+            Wrong::Disturbance(number) => self.interference.retime(number, from, until),
+            Wrong::Affliction(number) => {
+                let what = self.afflictions.retime(number, from, until);
+                if let Affliction::NoRecovery(NodeId(index)) = what {
+                    self.nodes[index].attend(until);
+                }
+            }
+        }
         self.next = self.foreseen();
     }
 
@@ -202,6 +231,14 @@ impl BuiltinBus {
                     self.report(time, node, Noticed::Recovered, Duration::ZERO);
                     None
                 }
+                Next::Hold(held) => {
+                    self.held = Some(held);
+                    None
+                }
+                Next::Held(time, step) => {
+                    self.endure(time, step);
+                    None
+                }
             };
             self.next = self.foreseen();
             if delivery.is_some() {
@@ -231,33 +268,27 @@ impl BuiltinBus {
         let Transmission {
             start, idle, from, ..
         } = *next;
+        self.statistics.collisions += u64::from(next.clash.is_some());
         self.idle = idle;
         let course = next.trouble.as_ref().map(|it| &it.course);
         let sent = course.is_none_or(|course| course.sent);
         let mut wait = Duration::ZERO;
         for NodeId(index) in from.iter() {
-            let node = &mut self.nodes[index];
-            let (place, mailbox) = node.candidate(start)?;
-            wait = wait.max(start.since(mailbox.queued));
-            if sent {
-                node.mailboxes.remove(place);
+            let (place, mailbox) = self.candidate(index, start)?;
+            // One that babbles has not been queued.
+            let queued = place.map_or(start, |_| mailbox.queued);
+            wait = wait.max(start.since(queued));
+            if let (true, Some(place)) = (sent, place) {
+                self.nodes[index].mailboxes.remove(place);
             }
         }
-        let to = if next.collides {
-            self.collide(next);
-            NodeSet::default()
-        } else {
-            self.settle(next)
-        };
-        for node in &mut self.nodes {
-            node.witness(start, idle, self.occurrence);
-            node.go_off(idle);
-        }
-        if next.collides {
-            return None;
+        let to = self.settle(next);
+        for index in 0..self.nodes.len() {
+            self.nodes[index].witness(start, idle, self.occurrence);
+            self.go_off(index, idle);
         }
         let received = !to.is_empty();
-        let is_error = course.is_some_and(|course| course.error.is_some());
+        let is_error = next.clash.is_some() || course.is_some_and(|course| course.error.is_some());
         let by_id = self.statistics.by_id.entry(next.frame.id()).or_default();
         for carried in [&mut self.statistics.total, by_id] {
             carried.add(idle.since(start), received.then_some(wait), is_error);
@@ -269,5 +300,36 @@ impl BuiltinBus {
             from,
             to,
         })
+    }
+
+    /// A node goes bus-off if its counters say so, on a bus that is idle from `idle` on. If its software begins the recovery it
+    /// does so at once.
+    fn go_off(&mut self, index: usize, idle: Instant) {
+        let left = Affliction::NoRecovery(NodeId(index));
+        let times = self.afflictions.of(left, idle);
+        let within = times.filter(|(from, _)| *from <= idle);
+        let attended = within.map(|(_, until)| until).max().unwrap_or(idle);
+        self.nodes[index].go_off(attended);
+    }
+}
+
+/// Something that is wrong with a bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrong {
+    /// The disturbance of this number.
+    Disturbance(usize),
+    /// The affliction of this number.
+    Affliction(usize),
+}
+
+/// The frame of the highest priority that a classical bus can carry, with eight bytes.
+fn babble(timing: &BitTiming) -> Mailbox {
+    let id = StandardId::new(0).expect("an identifier of 11 bits");
+    let frame = CanFrame::classical(id, &[0; 8]).expect("eight bytes");
+    Mailbox {
+        arbitration: arbitration_field(&frame).0,
+        frame,
+        queued: Instant::ORIGIN,
+        duration: timing.duration(FrameBits::exact(&frame)),
     }
 }

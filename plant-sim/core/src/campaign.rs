@@ -4,7 +4,8 @@
 //! case      situations x faults x windows, and each case of them
 //! expect    by when a fault has to be detected, and which ones a sound system survives
 //! bounds    how far, fast and deep the arm may go, from the robot's own limits
-//! judge     the observer who compares a run with both (its measure of the lift in lift)
+//! spells    the faults of a case, each with its time
+//! judge     the observer who compares a run with both (what the drives obey in newest, its measure of the lift in lift)
 //! verdict   what a case is held to, and what became of it
 //! trial     one case: the run, what follows it, and the verdict
 //! tally     worst cases by fault and situation, and the bound of the miss rate
@@ -18,6 +19,8 @@ pub mod case;
 pub mod expect;
 pub mod judge;
 mod lift;
+mod newest;
+pub mod spells;
 pub mod tally;
 pub mod trial;
 pub mod verdict;

@@ -11,14 +11,15 @@ use protocol::codec::{self, Encoder};
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Command, ControlWord, DriveStatus, Feedback, Message, ParameterError, ParameterReply,
-    ParameterRequest, Server,
+    Command, ControlWord, DriveStatus, Feedback, Message, NmtCommand, Node, ParameterError,
+    ParameterReply, ParameterRequest, Server,
 };
 use protocol::parameters::{self, DriveParameter};
 use protocol::table;
 use protocol::time::{Instant, Period};
 
-use crate::model::RobotModel;
+use crate::clock::BrokenClock;
+use crate::model::{DriveTrain, RobotModel};
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::plant::Plant;
 use crate::world::World;
@@ -44,12 +45,12 @@ pub struct Drives {
     cut: bool,
     /// Encoder counts of the last sample.
     previous: Option<[i32; 4]>,
-    /// Radians per count, and the rated torques, the scale of feedback.
-    radians_per_count: f64,
-    rated: [f64; 4],
+    train: DriveTrain,
     period: Period,
     /// Sample that the last command echoed.
     answered: Option<u32>,
+    /// Time of that command.
+    commanded: Instant,
     control: ControlWord,
     /// Whether they have switched off by themselves, and no command has let go of torque since.
     let_down: bool,
@@ -58,19 +59,24 @@ pub struct Drives {
 impl Drives {
     /// Drives of `model`, sampled every `period`.
     pub fn new(model: &RobotModel, period: Period) -> Self {
+        Self::started(model.drive, period, Instant::ORIGIN)
+    }
+
+    /// Drives that have just been switched on.
+    fn started(train: DriveTrain, period: Period, next: Instant) -> Self {
         Self {
             sample: 0,
-            next: Instant::ORIGIN,
+            next,
             encoder: Encoder::default(),
             commands: Receiver::new(Profile::Fd),
             requests: Receiver::new(Profile::Fd),
-            settings: Settings::new(&model.drive, period),
+            settings: Settings::new(&train, period),
             cut: false,
             previous: None,
-            radians_per_count: std::f64::consts::TAU / f64::from(model.drive.encoder_counts),
-            rated: model.drive.motor_torque_rated,
+            train,
             period,
             answered: None,
+            commanded: Instant::ORIGIN,
             control: ControlWord::EMPTY,
             let_down: false,
         }
@@ -85,14 +91,16 @@ impl Drives {
             .replace(reading.counts)
             .unwrap_or(reading.counts);
         let period = self.period.duration().seconds();
+        let radians_per_count = std::f64::consts::TAU / f64::from(self.train.encoder_counts);
         let mut velocity = [0.0f32; 4];
         let mut torque = [0i16; 4];
         for axis in 0..4 {
             let counts = reading.counts[axis].wrapping_sub(before[axis]);
             // What a broken encoder makes of it, no motor reaches: a drive reports its greatest value.
-            velocity[axis] = ((f64::from(counts) * self.radians_per_count / period) as f32)
+            velocity[axis] = ((f64::from(counts) * radians_per_count / period) as f32)
                 .clamp(-VELOCITY_RANGE, VELOCITY_RANGE);
-            let per_mille = reading.motor_torque[axis] / self.rated[axis] * 1000.0;
+            let per_mille =
+                reading.motor_torque[axis] / self.train.motor_torque_rated[axis] * 1000.0;
             // `as` saturates, for the same reason.
             torque[axis] = per_mille.round() as i16;
         }
@@ -100,6 +108,7 @@ impl Drives {
         let feedback = Feedback {
             sample: self.sample,
             status: (DriveStatus::READY | DriveStatus::ENCODER_VALID)
+                .with(DriveStatus::FAULT, plant.has_dip())
                 .with(DriveStatus::TORQUE_ON, powered)
                 .with(DriveStatus::BRAKE_RELEASED, !plant.brake().is_closed())
                 .with(
@@ -117,12 +126,13 @@ impl Drives {
     }
 
     /// Takes a command that has just arrived. A damaged or old one is ignored.
-    fn receive(&mut self, frame: &CanFrame, plant: &mut Plant) {
+    fn receive(&mut self, now: Instant, frame: &CanFrame, plant: &mut Plant) {
         if let Ok(received) = codec::decode(frame)
             && let Message::Command(command) = received.message
             && self.age(command.sample) <= self.settings.hold_samples()
             && self.commands.check(received.counter.unwrap_or(0)).is_new()
         {
+            self.commanded = now;
             self.apply(&command, plant);
         }
     }
@@ -174,6 +184,19 @@ impl Drives {
         plant.set_brake(!self.control.contains(release));
     }
 
+    /// Network management: a reset is what switching on is, but for the beat of the samples.
+    fn manage(&mut self, frame: &CanFrame, plant: &mut Plant) {
+        if let Ok(received) = codec::decode(frame)
+            && let Message::Nmt(nmt) = received.message
+            && nmt.command == NmtCommand::ResetNode
+            && [0, Node::Drives.code()].contains(&nmt.node)
+        {
+            plant.set_brake(true);
+            plant.set_torque_enabled(false);
+            *self = Self::started(self.train, self.period, self.next);
+        }
+    }
+
     /// Samples since the one after `sample`.
     fn age(&self, sample: u32) -> u32 {
         self.sample.wrapping_sub(sample).wrapping_sub(1)
@@ -185,13 +208,26 @@ impl Drives {
             return;
         };
         if self.age(answered) > self.settings.hold_samples() {
-            self.let_down |= self.control.contains(ControlWord::TORQUE_ENABLE);
-            plant.set_brake(true);
-            plant.set_torque_enabled(false);
-            self.control = ControlWord::EMPTY;
-            self.commands.reset();
-            self.requests.reset();
+            self.let_go(plant);
         }
+    }
+
+    /// The same by a clock of its own, when that of the samples stands still.
+    fn watchdog(&mut self, now: Instant, plant: &mut Plant) {
+        let held = self.period.duration() * (self.settings.hold_samples() + 1);
+        if self.answered.is_some() && now.since(self.commanded) > held {
+            plant.advance_to(now.nanos());
+            self.let_go(plant);
+        }
+    }
+
+    fn let_go(&mut self, plant: &mut Plant) {
+        self.let_down |= self.control.contains(ControlWord::TORQUE_ENABLE);
+        plant.set_brake(true);
+        plant.set_torque_enabled(false);
+        self.control = ControlWord::EMPTY;
+        self.commands.reset();
+        self.requests.reset();
     }
 }
 
@@ -210,17 +246,23 @@ impl Peer for Drives {
         let plant = &mut world.plant;
         match received {
             None => {
-                plant.advance_to(now.nanos());
-                out.push((now, self.feedback(plant)));
-                self.next = now + self.period.duration();
+                let period = self.period.duration();
+                self.next = now + BrokenClock::tick(&world.clock, period);
+                if BrokenClock::misses(&mut world.clock) {
+                    self.watchdog(now, plant);
+                } else {
+                    plant.advance_to(now.nanos());
+                    out.push((now, self.feedback(plant)));
+                }
             }
             Some(frame) if table::COMMAND.identifies(frame) => {
                 plant.advance_to(now.nanos());
-                self.receive(frame, plant);
+                self.receive(now, frame, plant);
             }
             Some(frame) if table::DRIVES_PARAMETER_REQUEST.identifies(frame) => {
                 out.extend(self.answer(frame).map(|answer| (now, answer)));
             }
+            Some(frame) if table::NMT.identifies(frame) => self.manage(frame, plant),
             Some(_) => {}
         }
         Ok(())

@@ -3,30 +3,42 @@
 //! A fault is one line of text, in a scenario as on the command line:
 //!
 //! ```text
-//! command:loss=0.2@0.3s..0.5s     PLACE[:AXIS]:KIND[=VALUE]@FROM[..UNTIL]
+//! command:loss=0.2@0.3s..0.5s     PLACE[:AXIS]:KIND[=VALUE]@WINDOW
 //! encoder:elbow:stuck@300ms
+//! motor:lift:dead@jump2+200ms..+50ms
 //! ```
 //!
-//! Three parts of a run carry them out. A wrapper around each node ([`Faulty`]) changes the frames that the node sends; a
-//! peer without frames ([`Injector`]) breaks parts of the robot and repairs them; the bus itself has the errors that CAN
-//! controllers find ([`Rig::spoil`](crate::rig::Rig::plant)). All are seeded, so a run with faults repeats to the byte. The
+//! Four parts of a run carry them out, each as long as the [`Window`] is open. A wrapper around each node ([`Faulty`]) changes
+//! the frames that the node sends, and takes its power; a peer without frames ([`Injector`]) breaks parts of the robot and
+//! repairs them; a foreign node ([`Impostor`]) sends frames that are not its own; the bus itself has the errors that CAN
+//! controllers find ([`Rig::spoil`](crate::rig::Rig::spoil)). All are seeded, so a run with faults repeats to the byte. The
 //! controller is not informed.
 
 mod frames;
+mod impostor;
 mod injector;
+mod kinds;
 mod parse;
+mod watch;
+mod window;
 
 use protocol::messages::Node;
 use protocol::schema::MessageInfo;
-use protocol::time::{Duration, Instant};
+use protocol::time::Duration;
 use serde::{Deserialize, Serialize};
 
 pub use frames::Faulty;
+pub use impostor::Impostor;
 pub use injector::Injector;
-pub use parse::{FaultError, KINDS, Kind};
+pub use kinds::{KINDS, Kind, Value};
+pub use parse::FaultError;
+pub use watch::Planned;
+pub(crate) use watch::{Sense, Watch};
+pub use window::{Activity, End, Episode, Moment, Span, Window};
 
-use crate::bus::ErrorKind;
-use crate::plant::defect::{EncoderDefect, MotorDefect};
+use crate::bus::{ErrorKind, Level};
+use crate::clock::ClockDefect;
+use crate::plant::defect::{BrakeDefect, EncoderDefect, LoadDefect, MotorDefect};
 
 /// A planned fault.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -36,10 +48,8 @@ pub struct Fault {
     pub text: String,
     /// What breaks, and how.
     pub what: What,
-    /// Beginning.
-    pub from: Instant,
-    /// End; [`Instant::MAX`] for a fault that stays.
-    pub until: Instant,
+    /// When.
+    pub window: Window,
 }
 
 impl From<Fault> for String {
@@ -48,34 +58,46 @@ impl From<Fault> for String {
     }
 }
 
-impl Fault {
-    /// Whether it is in effect.
-    pub fn acts(&self, now: Instant) -> bool {
-        (self.from..self.until).contains(&now)
-    }
-}
-
 /// What breaks, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum What {
     /// Frames of one message, between the node that sends them and the bus.
     Frames(&'static MessageInfo, FrameFault),
+    /// A foreign node sends the message, once a sample.
+    Foreign(&'static MessageInfo, Disguise),
     /// The node neither receives nor sends.
     Silent(Node),
+    /// The node has no power, and starts anew when it has.
+    Dead(Node),
+    /// The node's CAN controller sends the frame of the highest priority whenever it can.
+    Babbling(Node),
     /// Attempts to send one message, on the bus: this error, in this share of them.
     Attempts(&'static MessageInfo, ErrorKind, f64),
     /// The node alone reads this share of the others' frames with a wrong CRC.
     Misreads(Node, f64),
     /// The node's CAN controller stays bus-off.
     NoRecovery(Node),
+    /// The wires of the bus are held at this level.
+    Wires(Level),
+    /// The clock by which the drives take their samples.
+    Clock(ClockDefect),
     /// An encoder, by axis.
     Encoder(usize, EncoderDefect),
     /// A motor, by axis.
     Motor(usize, MotorDefect),
-    /// The brake of the lift stays as it is.
-    BrakeStuck,
-    /// The payload falls out of the gripper.
-    PayloadDropped,
+    /// The brake of the lift.
+    Brake(BrakeDefect),
+    /// What the flange carries.
+    Load(LoadDefect),
+}
+
+/// How well a foreign node imitates another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Disguise {
+    /// By the identifier and the length alone: the end-to-end protection is wrong.
+    Poor,
+    /// In everything: the last frame of the message again, with the next counter and the right CRC.
+    Perfect,
 }
 
 /// What happens to a frame before it is on the bus.
@@ -83,6 +105,10 @@ pub enum What {
 pub enum FrameFault {
     /// It is lost, with this probability.
     Loss(f64),
+    /// It is lost in bursts: this share of all frames, in bursts of this many on average (Gilbert 1960, Elliott 1963).
+    Burst(f64, f64),
+    /// It goes out after the next one of its message, with this probability.
+    Reorder(f64),
     /// It is delayed by this many seconds.
     Delay(f64),
     /// It is delayed by a random time, uniform from 0 to this many seconds.

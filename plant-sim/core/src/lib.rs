@@ -18,6 +18,7 @@
 //! plant, model           the robot in f64, derived independently, and its data
 //! metrics                errors, settling, utilisation
 //! requirements           what is required of a run, judged with its margin
+//! clock                  what can be wrong with the clock of the drives
 //! rehearsal              a scenario as the controller plans it, without a robot
 //! faults, campaign       what breaks in a run; many runs with faults, judged
 //! ```
@@ -43,6 +44,7 @@
 mod allowed;
 pub mod bus;
 pub mod campaign;
+pub mod clock;
 pub mod controller;
 mod convert;
 pub mod curves;

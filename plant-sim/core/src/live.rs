@@ -10,7 +10,7 @@ use protocol::messages::Node;
 use protocol::time::Instant;
 
 use crate::drives::Drives;
-use crate::faults::{Fault, Faulty, Injector};
+use crate::faults::{Fault, Faulty, Injector, Planned};
 use crate::observer::{Observer, Pace};
 use crate::operator::{Answer, Desk, Order};
 use crate::peer::{Peer, PeerError};
@@ -20,17 +20,17 @@ use crate::setup::RunConfig;
 
 /// Something that can be broken during a run.
 trait Breakable {
-    fn plant(&mut self, fault: &Fault);
+    fn plant(&mut self, fault: &Planned);
 }
 
 impl<P: Peer> Breakable for Faulty<P> {
-    fn plant(&mut self, fault: &Fault) {
+    fn plant(&mut self, fault: &Planned) {
         self.suffer_also(fault);
     }
 }
 
 impl Breakable for Injector {
-    fn plant(&mut self, fault: &Fault) {
+    fn plant(&mut self, fault: &Planned) {
         self.inject_also(fault);
     }
 }
@@ -53,7 +53,10 @@ impl<'p> Live<'p> {
         connect: impl FnOnce(Config) -> Result<C, PeerError>,
     ) -> Result<Self, Failure> {
         let setup = config.rig()?;
+        let mut rig = Rig::new(&setup);
         let (faults, seed) = (&config.scenario.faults, config.scenario.seed);
+        let faults: Vec<Planned> = faults.iter().map(|fault| rig.plan(fault)).collect();
+        let faults = faults.as_slice();
         let controller = Faulty::new(connect(setup.controller())?, Node::Controller, faults, seed);
         let controller = Rc::new(RefCell::new(controller));
         let drives = Drives::new(&setup.actual, setup.period);
@@ -72,7 +75,6 @@ impl<'p> Live<'p> {
         )));
         let injector = Rc::new(RefCell::new(Injector::new(faults, seed)));
 
-        let mut rig = Rig::new(&setup);
         // In the order of other runs.
         rig.attach_aside(Rc::clone(&injector));
         rig.attach_as(Node::Drives, Rc::clone(&drives));
@@ -109,12 +111,13 @@ impl<'p> Live<'p> {
         self.desk.borrow().peer().is_scripted()
     }
 
-    /// Breaks something from the time on that the fault says, as if the scenario had it.
+    /// Breaks something when the fault says, as if the scenario had it. What it waits for has to begin from now on, or goes on.
     pub fn plant(&mut self, fault: &Fault) {
+        let fault = self.rig.plan(fault);
         for part in &self.breakable {
-            part.borrow_mut().plant(fault);
+            part.borrow_mut().plant(&fault);
         }
-        self.rig.spoil(fault, self.seed);
+        self.rig.spoil(&fault, self.seed);
     }
 
     /// One sample.

@@ -9,6 +9,9 @@ use trace::ErrorFrame;
 use crate::plant::Plant;
 use crate::world::{CellEvent, Mind};
 
+/// Joint speed up to which an axis counts as at rest, rad/s and m/s.
+const RESTING: f64 = 1e-3;
+
 /// One sample as it truly was, and as the controller intended it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
@@ -48,6 +51,11 @@ impl PlantState {
             at_limit: plant.at_limit(),
         }
     }
+
+    /// Whether any axis moves.
+    pub fn is_moving(&self) -> bool {
+        self.qd.iter().any(|qd| qd.abs() > RESTING)
+    }
 }
 
 /// Observer of a run in progress, with a method per kind of event. A pair of observers is an observer, and
@@ -85,6 +93,12 @@ pub trait Observer {
     fn cell_event(&mut self, event: &CellEvent) {
         let _ = event;
     }
+
+    /// The fault of this number, counted from 0, is in effect from then until then. Of faults whose times depend on what
+    /// happens, as soon as that is known and when it changes.
+    fn fault(&mut self, number: usize, from: Instant, until: Instant) {
+        let _ = (number, from, until);
+    }
 }
 
 impl Observer for () {}
@@ -104,6 +118,10 @@ impl<O: Observer> Observer for &mut O {
 
     fn cell_event(&mut self, event: &CellEvent) {
         (**self).cell_event(event);
+    }
+
+    fn fault(&mut self, number: usize, from: Instant, until: Instant) {
+        (**self).fault(number, from, until);
     }
 }
 
@@ -129,6 +147,12 @@ impl<O: Observer> Observer for Option<O> {
             observer.cell_event(event);
         }
     }
+
+    fn fault(&mut self, number: usize, from: Instant, until: Instant) {
+        if let Some(observer) = self {
+            observer.fault(number, from, until);
+        }
+    }
 }
 
 impl<A: Observer, B: Observer> Observer for (A, B) {
@@ -150,6 +174,11 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     fn cell_event(&mut self, event: &CellEvent) {
         self.0.cell_event(event);
         self.1.cell_event(event);
+    }
+
+    fn fault(&mut self, number: usize, from: Instant, until: Instant) {
+        self.0.fault(number, from, until);
+        self.1.fault(number, from, until);
     }
 }
 

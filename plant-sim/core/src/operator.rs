@@ -201,6 +201,19 @@ impl Operator {
                 fault: state.fault(),
             });
         }
+        // A controller that has just started has no move to end.
+        if let Some(Task {
+            action: Action::WaitArrived,
+            ..
+        }) = self.current
+            && let Some(state) = self.state
+            && matches!(
+                state.mode,
+                Mode::Boot | Mode::SelfTest | Mode::PreOperational | Mode::Ready
+            )
+        {
+            return Err(OperatorError::Restarted { mode: state.mode });
+        }
         if now.since(self.heard) > SILENCE_LIMIT {
             return Err(OperatorError::Silent { since: self.heard });
         }

@@ -178,7 +178,7 @@ impl Plant {
 
     fn hold(&mut self, payload: Option<Payload>) {
         self.payload = payload;
-        self.arm = Arm::new(&self.model, payload.as_ref());
+        self.arm = Arm::new(&self.model, self.defects.burden(payload).as_ref());
     }
 
     /// Integrates up to time `t` (ns). An earlier time has no effect.
@@ -303,7 +303,8 @@ impl Plant {
         let speed = self.drive.to_motor(qd);
         let torque = self.given_torque(&speed);
         let stop = self.stops.effort(q, qd);
-        let effort = self.drive.joint_effort(&torque) - self.arm.bias(at, qd) - friction + stop;
+        let mut effort = self.drive.joint_effort(&torque) - self.arm.bias(at, qd) - friction + stop;
+        self.defects.pull(&self.arm, at, &mut effort);
         let lost = friction.dot(qd) - stop.dot(qd) - self.stops.spring_power(q, qd);
         let rates = Rates::new(
             torque[0],
@@ -337,7 +338,7 @@ impl Plant {
         };
         self.latched = (self.now, total);
         Sample {
-            counts: self.defects.read(self.encoder_counts()),
+            counts: self.defects.read(self.encoder_counts(), self.now),
             motor_torque,
         }
     }

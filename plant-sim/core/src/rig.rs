@@ -4,6 +4,7 @@
 //! command therefore acts as late as it would on the wire, and the same inputs give the same bytes.
 
 mod errors;
+mod schedule;
 
 use std::collections::VecDeque;
 use std::io;
@@ -26,6 +27,7 @@ use crate::plant::Plant;
 use crate::world::Mind;
 use crate::world::OperatorError;
 use crate::world::World;
+use schedule::Schedule;
 
 /// Transmit mailboxes of a node: as many as an FDCAN or M_CAN has and more than it needs.
 const MAILBOXES: usize = 32;
@@ -78,6 +80,7 @@ pub struct Rig<'p> {
     outside: NodeId,
     /// Nodes by name.
     names: Vec<(Node, NodeId)>,
+    faults: Schedule,
     /// Frames that will enter the transmit buffer of their node later, by time.
     pending: VecDeque<(Instant, NodeId, CanFrame)>,
     /// Frames sent in the current call; empty between calls.
@@ -113,11 +116,13 @@ impl<'p> Rig<'p> {
             world: World {
                 plant: Plant::new(&config.actual, config.start),
                 mind: Mind::BLANK,
+                clock: None,
                 cell_events: Vec::new(),
                 outcome: None,
             },
             outside: bus.attach_listener(MAILBOXES),
             names: Vec::new(),
+            faults: Schedule::default(),
             bus,
             seats: Vec::new(),
             pending: VecDeque::new(),
@@ -239,6 +244,7 @@ impl<'p> Rig<'p> {
         pace.sample(now).map_err(RunError::Pace)?;
         self.world.plant.advance_to(now.nanos());
         let plant = PlantState::of(&self.world.plant, now);
+        self.watch(now, observer);
         self.sample += 1;
         while let Some(event) = self.next_event(self.now()) {
             match event {
@@ -297,6 +303,7 @@ impl<'p> Rig<'p> {
         observer: &mut O,
     ) -> Result<(), RunError> {
         observer.frame(delivery.time, &delivery.frame)?;
+        self.faults.hear(&delivery.frame);
         for seat in 0..self.seats.len() {
             if delivery.to.contains(self.seats[seat].node) {
                 self.call(seat, delivery.time, Some(&delivery.frame), observer)?;
@@ -320,6 +327,7 @@ impl<'p> Rig<'p> {
             self.pending.insert(place, (time.max(now), *node, frame));
         }
         for event in self.world.cell_events.drain(..) {
+            self.faults.notice(&event);
             observer.cell_event(&event);
         }
         Ok(())

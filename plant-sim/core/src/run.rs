@@ -7,7 +7,7 @@ use protocol::messages::Node;
 
 use crate::controller::InProcess;
 use crate::drives::Drives;
-use crate::faults::{Faulty, Injector};
+use crate::faults::{Faulty, Injector, Planned};
 use crate::observer::{Observer, Pace};
 use crate::operator::Operator;
 use crate::peer::{Peer, PeerError};
@@ -76,6 +76,8 @@ pub(crate) fn assemble<'p, C: Peer + 'p>(
     let drives = Drives::new(&rig.actual, rig.period);
     let mut rig = Rig::new(&rig);
     let Scenario { faults, seed, .. } = &config.scenario;
+    let faults: Vec<Planned> = faults.iter().map(|fault| rig.plan(fault)).collect();
+    let faults = faults.as_slice();
     if !faults.is_empty() {
         // Before the drives, so that what breaks at a sampling instant is sampled broken.
         rig.attach_aside(Injector::new(faults, *seed));

@@ -86,7 +86,7 @@ pub struct Summary {
     pub bus_errors: u64,
     /// Samples without a command by the time of the next sample.
     pub overruns: u64,
-    /// Frames lost to a full transmit queue or an identifier collision.
+    /// Frames lost to a full transmit queue.
     pub frames_lost: u64,
     /// Faults that the controller reported; one that follows itself is listed once.
     pub faults: Vec<Fault>,
@@ -190,7 +190,7 @@ impl Collector {
         let scenario = &config.scenario;
         let bus = rig.bus();
         let sim = rig.now();
-        let frames_lost = rig.dropped() + 2 * bus.collisions;
+        let frames_lost = rig.dropped();
         let requirements = judge.finish(frames_lost, sim.seconds());
         let stopped = matches!(
             result,

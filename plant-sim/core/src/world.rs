@@ -6,6 +6,7 @@ use firmware::node::Node;
 use protocol::messages::{Fault, Mode, MotionRequest, Refusal};
 use protocol::time::{Duration, Instant};
 
+use crate::clock::BrokenClock;
 use crate::model::Payload;
 use crate::plant::Plant;
 use crate::refusal::sentence;
@@ -17,6 +18,8 @@ pub struct World {
     pub plant: Plant,
     /// The controller's intention.
     pub mind: Mind,
+    /// The clock by which the drives take their samples; `None` while it is sound.
+    pub clock: Option<BrokenClock>,
     /// Events in the cell during this call.
     pub cell_events: Vec<CellEvent>,
     /// Outcome of the operator's scenario, once it has ended.
@@ -32,6 +35,8 @@ pub struct Mind {
     pub qd: [f64; 4],
     /// State of the cabinet.
     pub mode: Mode,
+    /// Sequence number of the move under way.
+    pub under_way: Option<u8>,
 }
 
 impl Mind {
@@ -40,7 +45,16 @@ impl Mind {
         q: [0.0; 4],
         qd: [0.0; 4],
         mode: Mode::Boot,
+        under_way: None,
     };
+
+    /// Whether there is a reference: a controller that has just started has none.
+    pub fn knows_where(&self) -> bool {
+        !matches!(
+            self.mode,
+            Mode::Boot | Mode::SelfTest | Mode::PreOperational
+        )
+    }
 
     /// The intention of this node.
     pub fn of(node: &Node) -> Self {
@@ -50,6 +64,7 @@ impl Mind {
             q: four(&controller.reference().q),
             qd: four(&controller.reference().qd),
             mode: controller.mode(),
+            under_way: controller.under_way(),
         }
     }
 }
@@ -133,6 +148,12 @@ pub enum OperatorError {
     Silent {
         /// Time of its last frame.
         since: Instant,
+    },
+    /// The controller has started anew, and knows nothing of the move that it was asked for.
+    #[error("the controller has started anew: it went to {mode} without a stop")]
+    Restarted {
+        /// State it is in.
+        mode: Mode,
     },
     /// The peers were built from different message tables.
     #[error(

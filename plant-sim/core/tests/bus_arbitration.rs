@@ -147,43 +147,6 @@ fn a_full_controller_refuses_and_counts_until_its_frame_is_sent() {
     assert_eq!(drain(&mut bus).len(), 2);
 }
 
-#[test]
-fn one_identifier_from_two_nodes_is_reported_and_both_frames_are_lost() {
-    let (mut bus, nodes) = bus_of(3);
-    bus.enqueue(nodes[0], ns(0), &classical(standard(0x1C0), &[1]))
-        .unwrap();
-    bus.enqueue(nodes[2], ns(0), &classical(standard(0x1C0), &[2]))
-        .unwrap();
-    let bystander = classical(standard(0x7FF), &[]);
-    bus.enqueue(nodes[1], ns(0), &bystander).unwrap();
-    let delivered = drain(&mut bus);
-    assert_eq!(delivered.len(), 1);
-    assert_eq!(delivered[0].frame, bystander);
-
-    let statistics = bus.statistics();
-    assert_eq!((statistics.collisions, statistics.total.frames), (1, 1));
-    let collision = statistics.first_collision.unwrap();
-    assert_eq!((collision.start, collision.id), (ns(0), standard(0x1C0)));
-    assert_eq!(
-        collision.nodes.iter().collect::<Vec<_>>(),
-        [nodes[0], nodes[2]]
-    );
-    // The bus was busy at least for the shortest such frame up to its CRC, before the bystander could start.
-    assert!(delivered[0].start > ns(34_000));
-}
-
-/// FDF follows the arbitration field, so a classical and an FD frame of one identifier collide too.
-#[test]
-fn a_classical_and_an_fd_frame_of_one_identifier_collide() {
-    let (mut bus, nodes) = bus_of(2);
-    bus.enqueue(nodes[0], ns(0), &classical(standard(0x1C0), &[]))
-        .unwrap();
-    let fd = CanFrame::fd(standard(0x1C0), &[], true).unwrap();
-    bus.enqueue(nodes[1], ns(0), &fd).unwrap();
-    assert_eq!(bus.pop_delivery(Instant::MAX), None);
-    assert_eq!(bus.statistics().collisions, 1);
-}
-
 /// No bit differs, so no node notices: CAN carries the frame once. An e-stop raised by two nodes does this.
 #[test]
 fn the_same_frame_from_two_nodes_is_carried_once() {

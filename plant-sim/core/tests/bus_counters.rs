@@ -30,8 +30,9 @@ type Row = (
 /// Rules of fault confinement, a row for each: letter, what happened before, the event, counters afterwards, state. Worked out by
 /// hand from the text of the standard.
 #[rustfmt::skip]
-const RULES: [Row; 22] = {
+const RULES: [Row; 27] = {
     use Rule::{DominantAfterFlag as B, Received as H, ReceiverError as A, Sent as G, TransmitterFlag as C};
+    use Rule::{ReceiverFlagBit as E, ReceiverHeld as FR, TransmitterFlagBit as D, TransmitterHeld as FT};
     use State::{BusOff, ErrorActive, ErrorPassive, Warning};
     [
         ("a: a receiver counts an error by 1", &[], A, (0, 1), ErrorActive),
@@ -39,6 +40,11 @@ const RULES: [Row; 22] = {
         ("b: who was first to see it counts 8", &[(A, 1)], B, (0, 9), ErrorActive),
         ("c: a transmitter counts an error flag by 8", &[], C, (8, 0), ErrorActive),
         ("c: the counters do not mix", &[(A, 3)], C, (8, 3), ErrorActive),
+        ("d: an error in its flag counts 8 more", &[(C, 1)], D, (16, 0), ErrorActive),
+        ("e: that of a receiver as well", &[(A, 1)], E, (0, 9), ErrorActive),
+        ("f: 14 dominant bits after the beginning of its flag count 8", &[(C, 1)], FT, (16, 0), ErrorActive),
+        ("f: for a receiver as well", &[(A, 1), (B, 1)], FR, (0, 17), ErrorActive),
+        ("f: and every 8 more, until bus-off", &[(C, 1), (FT, 30)], FT, (256, 0), BusOff),
         ("g: a frame sent takes 1 back", &[(C, 1)], G, (7, 0), ErrorActive),
         ("g: but not below 0", &[], G, (0, 0), ErrorActive),
         ("g: and nothing from the other counter", &[(A, 5)], G, (0, 5), ErrorActive),

@@ -11,15 +11,19 @@
 #[path = "common/bench.rs"]
 mod bench;
 
-use bench::{Bench, attempts, ns};
+use bench::{Bench, ns};
 use protocol::frame::{CanFrame, Id, StandardId};
 use protocol::table::{COMMAND, FEEDBACK};
 use protocol::time::Duration;
 use protocol::wire::{BitTiming, FrameBits};
-use sim::bus::{Counters, Disturbance, Disturbed, ErrorKind, Noticed, State};
+use sim::bus::{Affliction, Counters, Disturbance, Disturbed, ErrorKind, Noticed, State};
 
 /// A microsecond is a nominal bit at the default 1 Mbit/s.
 const BIT: u64 = 1_000;
+
+fn attempts(kind: ErrorKind) -> Disturbed {
+    Disturbed::Message(&COMMAND, kind)
+}
 
 fn command() -> CanFrame {
     let id = Id::Standard(StandardId::new(COMMAND.id).unwrap());
@@ -256,7 +260,8 @@ fn a_controller_that_nobody_tells_stays_bus_off() {
         (50_000_000, Some(50_000_000 + 128 * 11 * BIT)),
     ] {
         let mut bench = Bench::of(2);
-        bench.bus.leave_off(bench.nodes[0], ns(0), ns(until));
+        let left = Affliction::NoRecovery(bench.nodes[0]);
+        bench.bus.afflict(left, ns(0), ns(until));
         bench.disturb(attempts(ErrorKind::Form), 0, 20_000_000);
         bench.send(0, 0, &command());
         assert!(bench.run(40_000_000).is_empty());

@@ -11,13 +11,17 @@
 #[path = "common/bench.rs"]
 mod bench;
 
-use bench::{Bench, attempts, ns};
+use bench::{Bench, ns};
 use proptest::prelude::*;
 use protocol::frame::{CanFrame, Id, StandardId};
 use protocol::table::COMMAND;
 use protocol::time::Duration;
 use protocol::wire::{BitTiming, FrameBits};
 use sim::bus::{BuiltinBus, Delivery, Disturbance, Disturbed, ErrorKind, NodeId, Noticed, Report};
+
+fn attempts(kind: ErrorKind) -> Disturbed {
+    Disturbed::Message(&COMMAND, kind)
+}
 
 /// Node and gap of each frame; kind, beginning, length and share of each disturbance; seed.
 type Run = (Vec<(usize, u64)>, Vec<(usize, u64, u64, f64)>, u64);

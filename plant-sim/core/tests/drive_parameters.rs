@@ -51,6 +51,7 @@ impl Bench {
             world: World {
                 plant: Plant::new(&model, START),
                 mind: Mind::BLANK,
+                clock: None,
                 cell_events: Vec::new(),
                 outcome: None,
             },

@@ -8,49 +8,23 @@
     reason = "a test fails by panicking"
 )]
 
-use std::io;
+#[path = "common/record.rs"]
+mod record;
 
 use protocol::frame::CanFrame;
 use protocol::messages::{Cause, Message, Mode};
 use protocol::time::Instant;
 use protocol::{codec, table};
+use record::{Record, run_of};
 use sim::faults::{Fault, KINDS};
-use sim::observer::{Observer, Truth};
-use sim::run::in_process;
+use sim::observer::Truth;
 use sim::scenario::Scenario;
-use sim::setup::RunConfig;
 use sim::summary::Summary;
-
-/// The frames and the flange of a run.
-#[derive(Default)]
-struct Record {
-    frames: Vec<(Instant, CanFrame)>,
-    truths: Vec<Truth>,
-}
-
-impl Observer for Record {
-    fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
-        self.frames.push((time, *frame));
-        Ok(())
-    }
-
-    fn sample(&mut self, truth: &Truth) -> io::Result<()> {
-        self.truths.push(*truth);
-        Ok(())
-    }
-}
 
 fn run(faults: &[&str], seed: u64) -> (Summary, Record) {
     let mut scenario = Scenario::built_in("gate").expect("the gate is built in");
     scenario.cycles = 1;
-    scenario.faults = faults
-        .iter()
-        .map(|text| text.parse().expect("a fault"))
-        .collect();
-    scenario.seed = seed;
-    let mut record = Record::default();
-    let summary = in_process(&RunConfig::new(scenario), &mut record).expect("the gate can begin");
-    (summary, record)
+    run_of(scenario, faults, seed)
 }
 
 /// The first cause that the controller reports.

@@ -38,6 +38,7 @@ fn sample(t: f64, tool: [f64; 4], moving: bool) -> Truth {
             q: [0.0; 4],
             qd: [0.0, 0.0, 0.0, f64::from(u8::from(moving))],
             mode: Mode::Enabled,
+            under_way: None,
         },
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
-use sim::campaign::case::{Crossing, Situation};
+use sim::campaign::case::{Crossing, Situation, planned};
 use sim::scenario::Change;
 use sim::setup::RunConfig;
 
@@ -48,10 +48,13 @@ pub struct SituationSpec {
     pub begin_ms: Begin,
 }
 
-/// When a fault may begin, ms from the beginning of the run.
+/// When a fault may begin, ms from the beginning of the run, or of something in it.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Begin {
+    /// What these times count from, as the window of a fault has it: `jump2`, `quick-stop`.
+    #[serde(default)]
+    pub after: String,
     /// Earliest.
     #[schemars(range(min = 0, max = 1e6))]
     pub from: f64,
@@ -108,11 +111,19 @@ fn situation(spec: &SituationSpec) -> Result<Situation, String> {
     }
     let config = RunConfig::new(scenario);
     config.rig().map_err(|error| wrong(error.to_string()))?;
-    let Begin { from, until, step } = spec.begin_ms;
+    let Begin {
+        ref after,
+        from,
+        until,
+        step,
+    } = spec.begin_ms;
+    // Whether it is a moment shows with any fault.
+    planned("payload:dropped", after, 0, 0).map_err(|error| wrong(error.to_string()))?;
     let in_range = |key: &str, ms| micros(key, ms).map_err(wrong);
     let situation = Situation {
         name: spec.name.clone(),
         scenario: config.scenario,
+        after: after.clone(),
         from: in_range("begin_ms.from", from)?,
         until: in_range("begin_ms.until", until)?,
         step: in_range("begin_ms.step", step)?,
@@ -150,6 +161,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn beginnings_count_from_what_is_named() {
+        let text = DEFAULT.replace("{ from = 250", "{ after = \"jump2\", from = 250");
+        let case = crossing(&text).unwrap().case(0, 0).unwrap();
+        assert!(case.faults.is_empty());
+        let texts: Vec<_> = (1..crossing(&text).unwrap().len())
+            .map_while(|place| crossing(&text).ok()?.case(place, 0))
+            .take(2)
+            .map(|case| case.faults[0].text.clone())
+            .collect();
+        assert!(
+            texts.iter().all(|text| text.contains("@jump2+250ms..+2ms")),
+            "{texts:?}"
+        );
+    }
+
+    #[test]
     fn what_cannot_be_crossed_is_refused_with_what_is_allowed() {
         for (from, to, why) in [
             ("step = 0.7", "step = 0", "begin_ms.step is 0"),
@@ -160,6 +187,11 @@ mod tests {
             ("payload = 22", "payload = -22", "payload"),
             ("cycles=1", "cycles=0", "cycles"),
             ("name = ", "nam = ", "unknown field"),
+            (
+                "{ from = 250",
+                "{ after = \"jmp2\", from = 250",
+                "did you mean jump?",
+            ),
         ] {
             let text = DEFAULT.replacen(from, to, 1);
             assert_ne!(text, DEFAULT);

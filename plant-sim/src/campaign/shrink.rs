@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use protocol::time::Instant;
+use protocol::time::Period;
 use sim::campaign::case::{Case, planned, what};
 use sim::campaign::verdict::{Requirement, Verdict};
-use sim::faults::{Fault, What};
+use sim::faults::{End, Fault, Moment, What, Window};
 use sim::plant::defect::{EncoderDefect, MotorDefect};
 
 use super::CampaignError;
@@ -40,6 +40,7 @@ pub fn shrink(plan: &Plan, case: &Case) -> Result<Option<Shrunk>, CampaignError>
     }
     let mut search = Search {
         plan,
+        rate_hz: plan.config(case)?.scenario.rate_hz,
         missed: verdict.missed.clone(),
         found: Shrunk {
             case: case.clone(),
@@ -57,6 +58,7 @@ pub fn shrink(plan: &Plan, case: &Case) -> Result<Option<Shrunk>, CampaignError>
 
 struct Search<'p> {
     plan: &'p Plan,
+    rate_hz: f64,
     missed: BTreeSet<Requirement>,
     found: Shrunk,
 }
@@ -110,11 +112,11 @@ impl Search<'_> {
             _ => 0.0,
         };
         let (mut fails, mut holds) = (value, harmless);
+        let window = fault.text.split_once('@').map_or("", |(_, window)| window);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (fails + holds);
-            let (begin, last) = window(&fault);
             // A value that the kind does not take holds as well.
-            let weaker = planned(&format!("{name}={middle}"), begin, last);
+            let weaker = format!("{name}={middle}@{window}").parse::<Fault>();
             if weaker.map_or(Ok(false), |weaker| self.fails_with(index, weaker))? {
                 fails = middle;
             } else {
@@ -126,7 +128,9 @@ impl Search<'_> {
 
     fn delay(&mut self, index: usize) -> Result<(), CampaignError> {
         let fault = self.found.case.faults[index].clone();
-        let (begin, last) = window(&fault);
+        let Some((begin, last)) = self.window(&fault) else {
+            return Ok(());
+        };
         let (mut fails, mut holds) = (begin, begin + HORIZON);
         while holds - fails > RESOLUTION {
             let middle = u64::midpoint(fails, holds);
@@ -141,7 +145,9 @@ impl Search<'_> {
 
     fn shorten(&mut self, index: usize) -> Result<(), CampaignError> {
         let fault = self.found.case.faults[index].clone();
-        let (begin, last) = window(&fault);
+        let Some((begin, last)) = self.window(&fault) else {
+            return Ok(());
+        };
         let (mut fails, mut holds) = (if last == 0 { HORIZON } else { last }, 0);
         while fails - holds > RESOLUTION {
             let middle = u64::midpoint(fails, holds);
@@ -161,16 +167,34 @@ impl Search<'_> {
         begin: u64,
         last: u64,
     ) -> Result<bool, CampaignError> {
-        let moved = planned(what(fault), begin, last);
+        let moved = planned(what(fault), after(fault), begin, last);
         moved.map_or(Ok(false), |moved| self.fails_with(index, moved))
+    }
+
+    /// Beginning and duration, µs; 0 for a fault that stays. `None` for one that lasts as long as something else.
+    fn window(&self, fault: &Fault) -> Option<(u64, u64)> {
+        let Window::From(Moment { after, .. }, end) = fault.window else {
+            return None;
+        };
+        let period = Period::of_rate(self.rate_hz);
+        let micros = |span: sim::faults::Span| span.time(period).micros();
+        let begin = micros(after);
+        let last = match end {
+            End::Never => 0,
+            End::At(until) => micros(until).saturating_sub(begin),
+            End::After(lasts) => micros(lasts),
+        };
+        Some((begin, last))
     }
 }
 
-/// Beginning and duration, µs; 0 for a fault that stays.
-fn window(fault: &Fault) -> (u64, u64) {
-    let last = match fault.until {
-        Instant::MAX => 0,
-        until => until.since(fault.from).micros(),
-    };
-    (fault.from.micros(), last)
+/// What the beginning counts from; empty for the run.
+fn after(fault: &Fault) -> &str {
+    match fault.window {
+        Window::From(Moment { of: Some(_), .. }, _) => {
+            let window = fault.text.split_once('@').map_or("", |(_, window)| window);
+            window.split(['+', '.']).next().unwrap_or_default()
+        }
+        _ => "",
+    }
 }

@@ -18,9 +18,11 @@ use plant_sim::run::{self, Recording, Results};
 use plant_sim::say;
 use plant_sim::verdicts::failure;
 use plant_sim::viewers::Viewers;
-use protocol::time::Period;
+use protocol::time::{Instant, Period};
 use sim::controller::InProcess;
 use sim::curves::Curves;
+use sim::faults::Fault;
+use sim::observer::Observer;
 use sim::setup::RunConfig;
 
 use super::{Failure, show};
@@ -74,6 +76,7 @@ pub(super) fn run(scenario: &str, args: &RunArgs) -> Result<(), Failure> {
     let place = args.place.place()?;
     let config = args.config.config(scenario)?;
     // Everything that can be refused is, before the folder is touched.
+    place.admit(&config.scenario.faults)?;
     config.rig().map_err(Failure::usage)?;
     let results = run::results(&args.out);
     let outputs = results.iter().chain(&args.mcap).map(PathBuf::as_path);
@@ -93,7 +96,8 @@ pub(super) fn run(scenario: &str, args: &RunArgs) -> Result<(), Failure> {
         progress: !args.quiet,
     };
     let mut curves = (!args.no_report).then(|| Curves::new(&config));
-    let seen = (&mut curves, &mut mcap);
+    let mut came = Came::new(&config);
+    let seen = (&mut came, (&mut curves, &mut mcap));
     interrupt::listen()?;
     let results = match place {
         Place::InProcess => {
@@ -156,8 +160,8 @@ pub(super) fn run(scenario: &str, args: &RunArgs) -> Result<(), Failure> {
         }
     }?;
     let end = results.summary.sim_time_s;
-    for fault in &config.scenario.faults {
-        if fault.from.seconds() >= end {
+    for (fault, from) in config.scenario.faults.iter().zip(&came.0) {
+        if from.seconds() >= end {
             say!(
                 "plant-sim: warning: the fault {} never came: the run ended at {end:.3} s",
                 fault.text
@@ -177,6 +181,30 @@ pub(super) fn run(scenario: &str, args: &RunArgs) -> Result<(), Failure> {
     }
     verdicts.write(&results)?;
     failure(&results.summary).map_or(Ok(()), |why| Err(Failure::failed(why)))
+}
+
+/// When each fault has begun, or would.
+struct Came(Vec<Instant>);
+
+impl Came {
+    fn new(config: &RunConfig) -> Self {
+        let period = Period::of_rate(config.scenario.rate_hz);
+        let from = |fault: &Fault| fault.window.fixed(period).map(|(from, _)| from);
+        let faults = config.scenario.faults.iter();
+        Self(
+            faults
+                .map(|fault| from(fault).unwrap_or(Instant::MAX))
+                .collect(),
+        )
+    }
+}
+
+impl Observer for Came {
+    fn fault(&mut self, number: usize, from: Instant, _: Instant) {
+        if let Some(begun) = self.0.get_mut(number) {
+            *begun = from.min(*begun);
+        }
+    }
 }
 
 /// Writes the page about the run.

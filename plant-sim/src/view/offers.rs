@@ -8,6 +8,8 @@ use sim::model::{AXES, RobotModel};
 use sim::scenario::{Scenario, Step};
 use sim::selection::LawChoice;
 
+use super::wish::MOMENTS;
+
 /// Controls and buttons that belong together.
 #[derive(Debug, Serialize)]
 pub struct Group {
@@ -180,16 +182,26 @@ pub fn of_run(scenario: &Scenario, robot: &RobotModel) -> Vec<Group> {
                     label: "Fault",
                     kind: FieldKind::Fault { faults: faults() },
                 },
+                choice(
+                    "when",
+                    "When",
+                    MOMENTS.map(|(name, _)| name.into()).into(),
+                    "at once",
+                ),
                 number(
                     "seconds",
-                    "Lasts (0: it stays)",
+                    "Lasts (0: as long as that, or it stays)",
                     [0.0, 3600.0],
                     0.1,
                     0.0,
                     "s",
                 ),
             ],
-            buttons: vec![button("Plant the fault", "fault", &["fault", "seconds"])],
+            buttons: vec![button(
+                "Plant the fault",
+                "fault",
+                &["fault", "when", "seconds"],
+            )],
         },
     ]
 }
@@ -298,7 +310,8 @@ fn faults() -> Vec<Breakage> {
             }),
         })
     });
-    let mut all: Vec<Breakage> = kinds.collect();
+    // An operator does not start anew.
+    let mut all: Vec<Breakage> = kinds.filter(|it| it.text != "operator:dead").collect();
     all.sort_by(|one, other| one.place.cmp(&other.place));
     all
 }

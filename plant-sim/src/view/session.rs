@@ -94,8 +94,8 @@ impl<'p> Session<'p> {
         let now = self.live.now();
         match wish {
             Wish::Order(order) => self.live.order(order),
-            Wish::Break(text, seconds) => {
-                let answer = match at(&text, now.seconds(), seconds) {
+            Wish::Break(text, event, seconds) => {
+                let answer = match at(&text, event, now.seconds(), seconds) {
                     Ok(fault) => {
                         self.live.plant(&fault);
                         let text = format!("fault planted: {}", fault.text);

@@ -13,8 +13,9 @@ use sim::selection::LawChoice;
 pub enum Wish {
     /// Something that the operator does.
     Order(Order),
-    /// Something that breaks at the next sample, for so many seconds where it does not stay broken: `encoder:elbow:stuck`.
-    Break(String, Option<f64>),
+    /// Something that breaks, `encoder:elbow:stuck`, at the next sample or when the next such thing goes on, for so many seconds where
+    /// it does not stay broken or last as long as that.
+    Break(String, Option<&'static str>, Option<f64>),
 }
 
 /// A wish as the page writes it.
@@ -63,9 +64,20 @@ pub(super) enum Asked {
     },
     Fault {
         fault: String,
+        when: String,
         seconds: f64,
     },
 }
+
+/// When a fault begins: at once, or with something that a window names.
+pub(super) const MOMENTS: [(&str, Option<&str>); 6] = [
+    ("at once", None),
+    ("while the arm moves", Some("moving")),
+    ("while it stops", Some("quick-stop")),
+    ("while the lift goes down", Some("lift-down")),
+    ("while the lift goes up", Some("lift-up")),
+    ("while it stops for a fault", Some("fault-reaction")),
+];
 
 /// The axis that moves in metres.
 const LIFT: usize = 2;
@@ -120,11 +132,20 @@ impl Asked {
                 law: law.law,
                 compensation: law.compensation,
             }),
-            Self::Fault { fault, seconds } => {
+            Self::Fault {
+                fault,
+                when,
+                seconds,
+            } => {
                 let seconds = (*seconds > 0.0).then_some(*seconds);
+                let (_, event) =
+                    (MOMENTS.iter().find(|(name, _)| name == when)).ok_or_else(|| {
+                        let names = MOMENTS.map(|(name, _)| name);
+                        format!("there is no moment {when:?}; allowed: {}", names.join(", "))
+                    })?;
                 // Whether it is one shows at any time.
-                at(fault, 0.0, seconds).map_err(|error| error.to_string())?;
-                Ok(Wish::Break(fault.clone(), seconds))
+                at(fault, *event, 0.0, seconds).map_err(|error| error.to_string())?;
+                Ok(Wish::Break(fault.clone(), *event, seconds))
             }
         }
     }
@@ -165,12 +186,22 @@ impl Asked {
     }
 }
 
-/// The fault from `t` on, s, for so many seconds.
-pub(super) fn at(fault: &str, t: f64, seconds: Option<f64>) -> Result<Fault, FaultError> {
+/// The fault from `t` on, s, or while the next `event` goes on; for so many seconds.
+pub(super) fn at(
+    fault: &str,
+    event: Option<&str>,
+    t: f64,
+    seconds: Option<f64>,
+) -> Result<Fault, FaultError> {
     // To the microsecond, without the digits that rounding leaves.
     let short = |t: f64| (t * 1e6).round() / 1e6;
-    let until = seconds.map_or_else(String::new, |seconds| format!("..{}s", short(t + seconds)));
-    format!("{fault}@{}s{until}", short(t)).parse()
+    let window = match (event, seconds) {
+        (None, None) => format!("{}s", short(t)),
+        (None, Some(seconds)) => format!("{}s..{}s", short(t), short(t + seconds)),
+        (Some(event), None) => format!("while={event}"),
+        (Some(event), Some(seconds)) => format!("{event}..+{}s", short(seconds)),
+    };
+    format!("{fault}@{window}").parse()
 }
 
 fn metres(millimetres: f64) -> f32 {

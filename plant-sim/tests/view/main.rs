@@ -184,7 +184,7 @@ fn another_host_another_origin_and_no_token_are_refused() {
             "unknown field `colour`",
         ),
         (
-            r#"{"fault":{"fault":"encoder:knee:stuck","seconds":0}}"#,
+            r#"{"fault":{"fault":"encoder:knee:stuck","when":"at once","seconds":0}}"#,
             "there is no axis",
         ),
         (

@@ -135,7 +135,7 @@ fn what_was_asked_for_is_in_the_recording_and_in_the_summary() {
     until("move-joint: accepted");
     ask(r#"{"law":{"law":"pd-gravity"}}"#);
     until("select-law");
-    ask(r#"{"fault":{"fault":"encoder:wrist:jump=1","seconds":0}}"#);
+    ask(r#"{"fault":{"fault":"encoder:wrist:jump=1","when":"at once","seconds":0}}"#);
     until("fault planted: encoder:wrist:jump=1@");
     let text = end(program);
     for part in [

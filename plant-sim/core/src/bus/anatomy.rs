@@ -56,7 +56,7 @@ pub enum Field {
 
 impl Field {
     /// Whether a node that reads another bit than its own may just have lost arbitration.
-    fn is_arbitration(self) -> bool {
+    pub(super) fn is_arbitration(self) -> bool {
         use Field::{ExtendedRtr, Id4To0, Id12To5, Id17To13, Id20To18, Id28To21, Ide, Rtr};
         self == Self::StartOfFrame
             || [Id28To21, Id20To18, Id17To13, Id12To5, Id4To0].contains(&self)
@@ -169,6 +169,21 @@ impl Anatomy {
             nominal: (index + 1 - fast) as u32,
             data: fast as u32,
         }
+    }
+
+    /// Length of the frame before each bit.
+    pub(super) fn starts(&self) -> impl Iterator<Item = FrameBits> {
+        let mut before = FrameBits {
+            nominal: 0,
+            data: 0,
+        };
+        (0..self.bits.len()).map(move |bit| {
+            let start = before;
+            let fast = self.fast.contains(&bit);
+            before.nominal += u32::from(!fast);
+            before.data += u32::from(fast);
+            start
+        })
     }
 
     /// The first bit of a field.

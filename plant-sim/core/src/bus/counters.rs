@@ -7,13 +7,11 @@ const PASSIVE: u16 = 128;
 /// From here on the node is bus-off, by its transmit error counter alone.
 const BUS_OFF: u16 = 256;
 /// Where the receive error counter stays: its register has eight bits.
-const MOST_RECEIVE: u16 = 255;
+pub(super) const MOST_RECEIVE: u16 = 255;
 /// What a successful reception makes of a receive error counter beyond it; the standard allows 119 to 127.
 const BACK: u16 = 127;
 
 /// What happens to a node on the bus as far as its counters are concerned; letters are those of the standard.
-///
-/// Rules d to f are about error flags that are disturbed themselves, which the bus does not model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
     /// a) A receiver has found an error.
@@ -22,6 +20,14 @@ pub enum Rule {
     DominantAfterFlag,
     /// c) A transmitter has sent an error flag, and none of the exceptions to this rule holds.
     TransmitterFlag,
+    /// d) A transmitter has read a recessive bit while it sent an active error flag.
+    TransmitterFlagBit,
+    /// e) A receiver has.
+    ReceiverFlagBit,
+    /// f) A transmitter has read the 14th dominant bit in a row since the beginning of its error flag, or eight more.
+    TransmitterHeld,
+    /// f) A receiver has.
+    ReceiverHeld,
     /// g) A frame was sent and acknowledged.
     Sent,
     /// h) A frame was received.
@@ -96,8 +102,12 @@ impl Counters {
         let Self { transmit, receive } = self;
         match rule {
             Rule::ReceiverError => *receive = (*receive + 1).min(MOST_RECEIVE),
-            Rule::DominantAfterFlag => *receive = (*receive + 8).min(MOST_RECEIVE),
-            Rule::TransmitterFlag => *transmit += 8,
+            Rule::DominantAfterFlag | Rule::ReceiverFlagBit | Rule::ReceiverHeld => {
+                *receive = (*receive + 8).min(MOST_RECEIVE);
+            }
+            Rule::TransmitterFlag | Rule::TransmitterFlagBit | Rule::TransmitterHeld => {
+                *transmit += 8;
+            }
             Rule::Sent => *transmit = transmit.saturating_sub(1),
             Rule::Received if *receive >= PASSIVE => *receive = BACK,
             Rule::Received => *receive = receive.saturating_sub(1),

@@ -12,13 +12,13 @@
 //! acknowledgement destroys nothing: receivers take its frame, which it then repeats.
 
 use super::anatomy::Field;
-use super::counters::{Rule, State};
+use super::counters::{Counters, Rule, State};
 use super::disturbance::{ErrorKind, Hit};
 
 /// Bits of an error flag.
 const FLAG: u32 = 6;
 /// Dominant bits where one node has seen the error a whole flag before the others: the most that the standard allows.
-const LONGEST_FLAGS: u32 = 2 * FLAG;
+pub(super) const LONGEST_FLAGS: u32 = 2 * FLAG;
 /// Dominant bits where the others see an error in the first bit of the flag.
 const FOLLOWED_FLAG: u32 = 1 + FLAG;
 
@@ -49,8 +49,8 @@ pub(super) struct Course {
     pub(super) sent: bool,
     /// Whether the transmitter is busy with an error flag of its own, which nobody sees.
     pub(super) passive_flag: bool,
-    /// What the transmitter counts.
-    pub(super) transmitter: Option<Rule>,
+    /// What the transmitter counts, in turn.
+    pub(super) transmitter: Vec<Rule>,
     /// What each reader counts, in turn, and whether it receives the frame.
     pub(super) readers: Vec<(Vec<Rule>, bool)>,
     /// What is wrong, as the one that sees it first reports it: the transmitter, or the first reader that misreads.
@@ -65,11 +65,11 @@ pub(super) fn course(state: State, readers: &[Reader], hit: Option<Hit>) -> Cour
     let is_missing = hit.is_some() || !is_acknowledged;
     let unread = readers.iter().any(|reader| reader.misreads);
     let is_flagged = (readers.iter()).any(|reader| reader.misreads && reader.state.is_active());
-    let destroyed = |flagged, flags, transmitter, error| Course {
+    let destroyed = |flagged, flags, transmitter: Option<Rule>, error| Course {
         destroyed: Some((flagged, flags)),
         sent: false,
         passive_flag: false,
-        transmitter,
+        transmitter: transmitter.into_iter().collect(),
         readers: vec![(vec![Rule::ReceiverError], false); readers.len()],
         error: Some(error),
     };
@@ -119,7 +119,7 @@ pub(super) fn course(state: State, readers: &[Reader], hit: Option<Hit>) -> Cour
             destroyed: None,
             sent: !is_missing,
             passive_flag: is_missing,
-            transmitter: (!is_missing).then_some(Rule::Sent),
+            transmitter: (!is_missing).then_some(Rule::Sent).into_iter().collect(),
             readers: readers.iter().map(read).collect(),
             error: match (is_missing, unread) {
                 (true, _) => Some(unacknowledged),
@@ -127,5 +127,71 @@ pub(super) fn course(state: State, readers: &[Reader], hit: Option<Hit>) -> Cour
                 (false, false) => None,
             },
         }
+    }
+}
+
+/// The course of a frame in which the transmitter reads recessive bits that it sends dominant: so are those of its error flag,
+/// each of which is an error in turn and begins a new flag, until it is passive or `bits` have passed. Receivers that have read the
+/// beginning of the frame are in the same situation.
+pub(super) fn shorted(
+    transmitter: Counters,
+    readers: &[Counters],
+    hit: Hit,
+    read: bool,
+    bits: u32,
+) -> Course {
+    let in_vain = |mut counters: Counters, first, each, bits: u32| {
+        let mut rules = vec![first];
+        counters.count(first);
+        while counters.state().is_active() && (rules.len() as u32) <= bits {
+            rules.push(each);
+            counters.count(each);
+        }
+        rules
+    };
+    let transmitter = in_vain(
+        transmitter,
+        Rule::TransmitterFlag,
+        Rule::TransmitterFlagBit,
+        bits,
+    );
+    let reader = |counters: &Counters| match read {
+        // They notice by six equal bits.
+        true => in_vain(
+            *counters,
+            Rule::ReceiverError,
+            Rule::ReceiverFlagBit,
+            bits.saturating_sub(FLAG - 1),
+        ),
+        false => Vec::new(),
+    };
+    let readers: Vec<Vec<Rule>> = readers.iter().map(reader).collect();
+    let longest = readers.iter().map(|rules| rules.len() + FLAG as usize);
+    let longest = longest
+        .max()
+        .filter(|_| read)
+        .unwrap_or(0)
+        .max(transmitter.len());
+    Course {
+        destroyed: Some((Flagged::Bit(hit.index), longest as u32 - 1 + FLAG)),
+        sent: false,
+        passive_flag: false,
+        transmitter,
+        readers: readers.into_iter().map(|rules| (rules, false)).collect(),
+        error: Some(hit.kind),
+    }
+}
+
+/// The course of frames of one identifier that differ in this bit, which some nodes send recessive and read dominant. One of those
+/// is active and destroys all of them.
+pub(super) fn clash(hit: Hit, readers: usize) -> Course {
+    Course {
+        destroyed: Some((Flagged::Bit(hit.index), LONGEST_FLAGS)),
+        sent: false,
+        passive_flag: false,
+        transmitter: vec![Rule::TransmitterFlag],
+        readers: vec![(vec![Rule::ReceiverError], false); readers],
+        // The loser reports it.
+        error: None,
     }
 }

@@ -91,9 +91,10 @@ struct Source {
 pub(super) struct Interference(Vec<Source>);
 
 impl Interference {
-    /// Adds a disturbance with a sequence of random numbers of its own.
-    pub(super) fn add(&mut self, disturbance: Disturbance, seed: u64) {
-        let number = self.0.len() as u128;
+    /// Adds a disturbance with a sequence of random numbers of its own; its number.
+    pub(super) fn add(&mut self, disturbance: Disturbance, seed: u64) -> usize {
+        let place = self.0.len();
+        let number = place as u128;
         let mut source = Source {
             disturbance,
             // Apart from those of the nodes, which have the same seed.
@@ -103,6 +104,13 @@ impl Interference {
         };
         source.draw();
         self.0.push(source);
+        place
+    }
+
+    /// Gives a disturbance another time.
+    pub(super) fn retime(&mut self, number: usize, from: Instant, until: Instant) {
+        let disturbance = &mut self.0[number].disturbance;
+        (disturbance.from, disturbance.until) = (from, until);
     }
 
     /// Draws the chances of the next attempt.

@@ -5,30 +5,35 @@ use protocol::frame::CanFrame;
 use protocol::time::{Duration, Instant};
 use protocol::wire::INTERMISSION;
 
-use super::anatomy::Anatomy;
+use super::affliction::{Affliction, Level};
+use super::anatomy::{Anatomy, Bit, Field};
 use super::counters::State;
-use super::course::{Course, Flagged, Reader, course};
+use super::course::{Course, Flagged, Reader, clash, course, shorted};
 use super::disturbance::{ErrorKind, Hit};
-use super::node::Node;
+use super::held::{Held, Step};
+use super::node::{Mailbox, Node};
 use super::{BuiltinBus, NodeId, NodeSet};
 
 /// Recessive bits that end an error frame.
-const DELIMITER: u32 = 8;
-/// Error flags of a collision, superposed: 6 to 12 bits.
-const COLLISION_FLAGS: u32 = 12;
+pub(super) const DELIMITER: u32 = 8;
 
 /// What happens next on the bus, as far as known.
 pub(super) enum Next {
     Transmission(Transmission),
     /// This node takes part again.
     Recovery(Instant, usize),
+    /// The bus is dominant where it should not be.
+    Hold(Held),
+    /// While it is.
+    Held(Instant, Step),
 }
 
 impl Next {
     pub(super) fn time(&self) -> Instant {
         match self {
             Self::Transmission(next) => next.end,
-            Self::Recovery(time, _) => *time,
+            Self::Recovery(time, _) | Self::Held(time, _) => *time,
+            Self::Hold(held) => held.start,
         }
     }
 }
@@ -41,9 +46,26 @@ pub(super) struct Transmission {
     pub(super) idle: Instant,
     pub(super) frame: CanFrame,
     pub(super) from: NodeSet,
-    pub(super) collides: bool,
+    /// Where other nodes send other frames of the same identifier.
+    pub(super) clash: Option<Clash>,
     /// Where anything is wrong with it. Seldom: the others are not to carry the room for it.
     pub(super) trouble: Option<Box<Trouble>>,
+}
+
+/// Frames of one identifier that were sent at the same instant and differ: arbitration cannot separate them.
+pub(super) struct Clash {
+    /// The bit in which they do.
+    pub(super) hit: Hit,
+    /// Who sends it recessive.
+    pub(super) losers: NodeSet,
+}
+
+impl Transmission {
+    /// Who sends something else and loses.
+    pub(super) fn losers(&self) -> NodeSet {
+        let losers = self.clash.as_ref().map(|clash| clash.losers);
+        losers.unwrap_or_default()
+    }
 }
 
 /// What is wrong with an attempt.
@@ -57,16 +79,48 @@ pub(super) struct Trouble {
 impl BuiltinBus {
     /// What happens next if nothing more is queued until then.
     pub(super) fn foreseen(&self) -> Option<Next> {
+        if let Some(held) = &self.held {
+            let (time, step) = self.next_step(held)?;
+            return Some(Next::Held(time, step));
+        }
         let recovery = (self.nodes.iter().enumerate())
             .filter_map(|(index, node)| Some((node.recovers(self.occurrence)?, index)))
             .min();
         let transmission = self.next_transmission();
+        let hold = self.hold(transmission.as_ref());
+        let start = transmission.as_ref().map(|next| next.start);
+        let start = start.into_iter().chain(hold.map(|hold| hold.start)).min();
         match (recovery, transmission) {
-            (Some((time, node)), next) if next.as_ref().is_none_or(|next| time <= next.start) => {
+            (Some((time, node)), _) if start.is_none_or(|start| time <= start) => {
                 Some(Next::Recovery(time, node))
             }
-            (_, next) => next.map(Next::Transmission),
+            (_, next) => hold.map(Next::Hold).or(next.map(Next::Transmission)),
         }
+    }
+
+    /// From when on the node can send something, if nothing more is queued.
+    fn earliest(&self, index: usize, node: &Node) -> Option<Instant> {
+        let babbling = Affliction::Babbling(NodeId(index));
+        let ready = node.ready.max(self.idle);
+        let babble = self.afflictions.of(babbling, ready);
+        let babble = babble.map(|(from, _)| from.max(ready)).min();
+        let babble = babble.filter(|_| node.off.is_none());
+        node.earliest(self.idle).into_iter().chain(babble).min()
+    }
+
+    /// The frame with which the node takes part in an arbitration at `start`, and the mailbox that holds it, if one does.
+    pub(super) fn candidate(
+        &self,
+        index: usize,
+        start: Instant,
+    ) -> Option<(Option<usize>, &Mailbox)> {
+        let node = &self.nodes[index];
+        let babbling = Affliction::Babbling(NodeId(index));
+        if self.afflictions.acts(babbling, start) && node.off.is_none() && node.ready <= start {
+            return Some((None, &self.babble));
+        }
+        let (place, mailbox) = node.candidate(start)?;
+        Some((Some(place), mailbox))
     }
 
     /// Arbitration among the frames queued so far.
@@ -74,44 +128,40 @@ impl BuiltinBus {
     /// A frame in transmission needs no state: frames queued after its start are not candidates, so the answer stays
     /// the same until it is complete.
     fn next_transmission(&self) -> Option<Transmission> {
-        let earliest = |node: &Node| node.earliest(self.idle);
-        let start = self.nodes.iter().filter_map(earliest).min()?;
-        let candidates = || {
-            self.nodes
-                .iter()
-                .enumerate()
-                .filter_map(|(index, node)| Some((index, node.candidate(start)?.1)))
-        };
+        let nodes = || self.nodes.iter().enumerate();
+        let start = nodes()
+            .filter_map(|(index, node)| self.earliest(index, node))
+            .min()?;
+        let candidates =
+            || nodes().filter_map(|(index, _)| Some((index, self.candidate(index, start)?.1)));
         let (_, winner) = candidates().min_by_key(|(_, mailbox)| mailbox.arbitration)?;
+        let arbitration = winner.arbitration;
+        let equals = || candidates().filter(move |(_, it)| it.arbitration == arbitration);
 
+        let differs = equals().any(|(_, mailbox)| mailbox.frame != winner.frame);
+        let (frame, clash) = if differs {
+            self.clash(equals().map(|(index, it)| (index, it.frame)).collect())
+        } else {
+            (winner.frame, None)
+        };
         let mut from = NodeSet::default();
-        let mut collides = false;
         let mut duration = Duration::ZERO;
-        for (index, mailbox) in
-            candidates().filter(|(_, mailbox)| mailbox.arbitration == winner.arbitration)
-        {
+        for (index, mailbox) in equals().filter(|(_, mailbox)| mailbox.frame == frame) {
             from.insert(index);
-            collides |= mailbox.frame != winner.frame;
-            duration = duration.max(mailbox.duration);
-        }
-        if collides {
-            // An upper bound: the longest frame in full, as if the last bit were the first to differ.
-            duration += self.bits(COLLISION_FLAGS + DELIMITER);
+            duration = mailbox.duration;
         }
         let mut next = Transmission {
             start,
             end: start + duration.saturating_sub(self.after_valid),
             idle: start + duration,
-            frame: winner.frame,
+            frame,
             from,
-            collides,
+            clash,
             trouble: None,
         };
-        if !collides {
-            next.trouble = self.trouble(start, &winner.frame, from);
-        }
+        next.trouble = self.trouble(&next);
         if let Some((flagged, flags)) = next.trouble.as_ref().and_then(|it| it.course.destroyed) {
-            let anatomy = Anatomy::of(&winner.frame);
+            let anatomy = Anatomy::of(&next.frame);
             let bits = anatomy.until(match flagged {
                 Flagged::Bit(index) => index,
                 Flagged::Field(field) => anatomy.first(field),
@@ -122,19 +172,75 @@ impl BuiltinBus {
         Some(next)
     }
 
-    /// What is wrong with an attempt to send `frame`, if anything is.
-    fn trouble(&self, start: Instant, frame: &CanFrame, from: NodeSet) -> Option<Box<Trouble>> {
+    /// Which of different frames goes on, and where the others lose.
+    fn clash(&self, mut frames: Vec<(usize, CanFrame)>) -> (CanFrame, Option<Clash>) {
+        let mut clash: Option<Clash> = None;
+        while let Some((first, other)) = frames
+            .first()
+            .and_then(|(_, first)| Some((*first, frames.iter().find(|(_, it)| it != first)?.1)))
+        {
+            let (one, two) = (Anatomy::of(&first), Anatomy::of(&other));
+            let differs = |(a, b): (&Bit, &Bit)| a.recessive != b.recessive;
+            let place = one.bits.iter().zip(&two.bits).position(differs);
+            // Frames that differ do so before their CRC.
+            let index = place.unwrap_or(0);
+            let loser = if one.bits[index].recessive == Some(true) {
+                &one
+            } else {
+                &two
+            };
+            let hit = Hit {
+                kind: ErrorKind::Bit,
+                index,
+                bit: loser.bits[index],
+            };
+            let lost = if std::ptr::eq(loser, &one) {
+                first
+            } else {
+                other
+            };
+            let is_active = |index: usize| self.nodes[index].counters.state().is_active();
+            let clash = clash.get_or_insert(Clash {
+                hit,
+                losers: NodeSet::default(),
+            });
+            let mut destroys = false;
+            for (index, _) in frames.extract_if(.., |(_, frame)| *frame == lost) {
+                clash.losers.insert(index);
+                destroys |= is_active(index);
+            }
+            if destroys {
+                clash.hit = hit;
+                // The flag of one ends the frames of all.
+                for (index, _) in frames.extract_if(1.., |_| true) {
+                    clash.losers.insert(index);
+                }
+                break;
+            }
+        }
+        let frame = frames.first().map(|(_, frame)| *frame);
+        (frame.expect("one frame is left"), clash)
+    }
+
+    /// What is wrong with an attempt, if anything is.
+    fn trouble(&self, next: &Transmission) -> Option<Box<Trouble>> {
+        let Transmission { start, from, .. } = *next;
+        let losers = next.losers();
         let others = || {
             let part = |(index, node): &(usize, &Node)| {
-                node.takes_part() && !from.contains(NodeId(*index))
+                let sends = |nodes: NodeSet| nodes.contains(NodeId(*index));
+                node.takes_part() && !sends(from) && !sends(losers)
             };
             self.nodes.iter().enumerate().filter(part)
         };
-        let calm = !self.interference.acts(start);
+        let short = self.short(next);
+        let is_active = |node: NodeId| self.counters(node).state().is_active();
+        let is_destroyed = losers.iter().any(is_active);
+        let calm = !self.interference.acts(start) && short.is_none() && !is_destroyed;
         if calm && others().next().is_some() {
             return None;
         }
-        let hit = self.interference.hit(start, frame);
+        let hit = self.interference.hit(start, &next.frame);
         let for_all = hit.is_some_and(|hit| hit.kind == ErrorKind::Crc);
         let reader = |(index, node): (usize, &Node)| {
             let reader = Reader {
@@ -144,19 +250,63 @@ impl BuiltinBus {
             (index, reader)
         };
         let readers: Vec<_> = others().map(reader).collect();
-        let senders = from.iter().map(|node| self.counters(node).state());
-        let course = course(
-            senders.min().unwrap_or(State::ErrorActive),
-            &readers
-                .iter()
-                .map(|(_, reader)| *reader)
-                .collect::<Vec<_>>(),
-            hit.filter(|_| !for_all),
-        );
+        let senders = from.iter().map(|node| self.counters(node));
+        let sender = senders.min_by_key(|counters| counters.transmit());
+        let sender = sender.unwrap_or_default();
+        let (hit, course) = if let Some((hit, read, bits)) = short {
+            let readers = others().map(|(_, node)| node.counters);
+            let readers: Vec<_> = readers.collect();
+            (Some(hit), shorted(sender, &readers, hit, read, bits))
+        } else if let Some(Clash { hit, .. }) = next.clash.as_ref().filter(|_| is_destroyed) {
+            (Some(*hit), clash(*hit, readers.len()))
+        } else {
+            let senders = from.iter().map(|node| self.counters(node).state());
+            let course = course(
+                senders.min().unwrap_or(State::ErrorActive),
+                &readers
+                    .iter()
+                    .map(|(_, reader)| *reader)
+                    .collect::<Vec<_>>(),
+                hit.filter(|_| !for_all),
+            );
+            (hit, course)
+        };
         Some(Box::new(Trouble {
             hit,
             readers,
             course,
         }))
+    }
+
+    /// Where an attempt meets wires that are held recessive: the first bit that is not read as it is sent, whether anybody has read
+    /// something before it, and for how many bits it goes on.
+    fn short(&self, next: &Transmission) -> Option<(Hit, bool, u32)> {
+        let recessive = Affliction::Wires(Level::Recessive);
+        let mut windows = self.afflictions.of(recessive, next.start).peekable();
+        windows.peek()?;
+        let anatomy = Anatomy::of(&next.frame);
+        let starts = anatomy
+            .starts()
+            .map(|bits| next.start + self.timing.duration(bits));
+        let bits: Vec<_> = starts.zip(&anatomy.bits).enumerate().collect();
+        let meets = |(from, until): (Instant, Instant)| {
+            let within = |time: Instant| from <= time && time < until && time < next.end;
+            let mut bits = bits.iter();
+            let (index, (_, bit)) =
+                bits.find(|(_, (time, bit))| within(*time) && bit.recessive != Some(true))?;
+            let kind = match bit.field {
+                Field::AckSlot => ErrorKind::Ack,
+                _ => ErrorKind::Bit,
+            };
+            let flag = next.start + self.timing.duration(anatomy.until(*index));
+            let left = until.since(flag).nanos().div_ceil(self.bits(1).nanos());
+            let hit = Hit {
+                kind,
+                index: *index,
+                bit: **bit,
+            };
+            Some((hit, *index > 0, left.min(64) as u32))
+        };
+        windows.filter_map(meets).min_by_key(|(hit, ..)| hit.index)
     }
 }

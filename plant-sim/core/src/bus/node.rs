@@ -30,8 +30,6 @@ pub(super) struct Node {
     pub(super) ready: Instant,
     /// Recovery, while bus-off.
     pub(super) off: Option<Recovery>,
-    /// Times in which nobody tells a bus-off controller to recover.
-    pub(super) unattended: Vec<(Instant, Instant)>,
 }
 
 /// Progress of a bus-off node.
@@ -52,7 +50,6 @@ impl Node {
             counters: Counters::default(),
             ready: Instant::ORIGIN,
             off: None,
-            unattended: Vec::new(),
         }
     }
 
@@ -80,18 +77,20 @@ impl Node {
         self.off.is_none() && !self.listens
     }
 
-    /// Goes bus-off if its counters say so, on a bus that is idle from `idle` on. If its software begins the recovery it does
-    /// so at once.
-    pub(super) fn go_off(&mut self, idle: Instant) {
+    /// Goes bus-off if its counters say so; its software begins the recovery at `attended`.
+    pub(super) fn go_off(&mut self, attended: Instant) {
         if self.off.is_none() && self.counters.state() == State::BusOff {
-            let attended = self
-                .unattended
-                .iter()
-                .filter_map(|(from, until)| (*from..*until).contains(&idle).then_some(*until));
             self.off = Some(Recovery {
-                since: attended.max().unwrap_or(idle),
+                since: attended,
                 left: OCCURRENCES,
             });
+        }
+    }
+
+    /// Its software begins the recovery at `attended`, if it has not begun before.
+    pub(super) fn attend(&mut self, attended: Instant) {
+        if let Some(Recovery { since, .. }) = &mut self.off {
+            *since = attended.min(*since);
         }
     }
 

@@ -3,14 +3,14 @@
 use protocol::time::{Duration, Instant};
 
 use super::counters::{Rule, State};
+use super::course::Course;
 use super::disturbance::ErrorKind;
-use super::foresight::{Transmission, Trouble};
+use super::foresight::{Clash, Transmission, Trouble};
 use super::report::{Noticed, Report};
-use super::statistics::Collision;
 use super::{BuiltinBus, Field, NodeId, NodeSet};
 
 /// Bits for which a passive transmitter lets others go first.
-const SUSPENSION: u32 = 8;
+pub(super) const SUSPENSION: u32 = 8;
 /// Bits of a passive error flag.
 const PASSIVE_FLAG: u32 = 6;
 
@@ -28,19 +28,22 @@ impl BuiltinBus {
             }
         };
         let nodes = &mut self.nodes;
+        let sent = [Rule::Sent];
+        let rules = match &next.trouble {
+            None => &sent[..],
+            Some(trouble) => &trouble.course.transmitter,
+        };
         for NodeId(index) in next.from.iter() {
-            let rule = match &next.trouble {
-                None => Some(Rule::Sent),
-                Some(trouble) => trouble.course.transmitter,
-            };
-            if let Some(rule) = rule {
-                count(nodes, index, rule);
-            }
+            rules.iter().for_each(|rule| count(nodes, index, *rule));
+        }
+        for NodeId(index) in next.losers().iter() {
+            count(nodes, index, Rule::TransmitterFlag);
         }
         let is_whole = (next.trouble.as_ref()).is_none_or(|it| it.course.destroyed.is_none());
         for index in 0..nodes.len() {
             let node = &nodes[index];
-            if node.off.is_some() || next.from.contains(NodeId(index)) {
+            let sends = |nodes: NodeSet| nodes.contains(NodeId(index));
+            if node.off.is_some() || sends(next.from) || sends(next.losers()) {
                 continue;
             }
             if node.listens {
@@ -76,16 +79,6 @@ impl BuiltinBus {
         to
     }
 
-    /// Both frames are lost, and nobody counts: see [`Collision`].
-    pub(super) fn collide(&mut self, next: &Transmission) {
-        self.statistics.collisions += 1;
-        self.statistics.first_collision.get_or_insert(Collision {
-            start: next.start,
-            id: next.frame.id(),
-            nodes: next.from,
-        });
-    }
-
     pub(super) fn report(&mut self, time: Instant, node: usize, what: Noticed, busy: Duration) {
         self.reports.push(Report {
             time,
@@ -103,7 +96,15 @@ impl BuiltinBus {
             Some(course) if course.passive_flag => PASSIVE_FLAG,
             _ => 0,
         };
-        for NodeId(index) in next.from.iter() {
+        let senders = next.from.iter().map(|node| (node, flag));
+        let unseen = if course.is_none_or(|course| course.destroyed.is_none()) {
+            PASSIVE_FLAG
+        } else {
+            0
+        };
+        let losers = next.losers();
+        let losers = losers.iter().map(|node| (node, unseen));
+        for (NodeId(index), flag) in senders.chain(losers) {
             if self.nodes[index].counters.state() == State::ErrorPassive {
                 self.nodes[index].ready = next.idle + self.bits(SUSPENSION + flag);
             }
@@ -112,6 +113,22 @@ impl BuiltinBus {
 
     /// The report of the node that sees the error first: a reader of a wrong CRC, and otherwise the transmitter.
     fn report_error(&mut self, next: &Transmission) {
+        let in_vain = |course: Option<&Course>| match course.and_then(|it| it.destroyed) {
+            Some(_) => next.idle.since(next.start),
+            None => Duration::ZERO,
+        };
+        if let Some(Clash { hit, losers }) = &next.clash {
+            let what = Noticed::Error {
+                kind: hit.kind,
+                field: hit.bit.field,
+                recessive: hit.bit.recessive,
+                sending: true,
+            };
+            let busy = in_vain(next.trouble.as_ref().map(|it| &it.course));
+            for NodeId(loser) in losers.iter().take(1) {
+                self.report(next.end, loser, what, busy);
+            }
+        }
         let Some(trouble) = &next.trouble else {
             return;
         };
@@ -134,10 +151,7 @@ impl BuiltinBus {
             sending: reader.is_none(),
         };
         if let Some(node) = reader.map(|(index, _)| *index).or(sender) {
-            let busy = match trouble.course.destroyed {
-                Some(_) => next.idle.since(next.start),
-                None => Duration::ZERO,
-            };
+            let busy = in_vain(Some(&trouble.course));
             self.report(next.end, node, what, busy);
         }
     }

@@ -3,23 +3,7 @@
 use std::collections::BTreeMap;
 
 use protocol::frame::Id;
-use protocol::time::{Duration, Instant};
-
-use super::nodes::NodeSet;
-
-/// Nodes that started different frames with one identifier at the same instant.
-///
-/// Arbitration cannot separate them, and a bit error follows. Real controllers repeat both frames and collide until
-/// both are bus-off; here both frames are lost at once. Two nodes with the same identifier are a configuration error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Collision {
-    /// When the frames started.
-    pub start: Instant,
-    /// Their identifier.
-    pub id: Id,
-    /// The nodes that sent them.
-    pub nodes: NodeSet,
-}
+use protocol::time::Duration;
 
 /// Traffic of one identifier, or of all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,8 +46,6 @@ pub struct Statistics {
     pub by_id: BTreeMap<Id, Carried>,
     /// Frames refused because every mailbox of their node was occupied.
     pub refused: u64,
-    /// Identifier collisions.
+    /// Attempts of several nodes at once to send different frames of one identifier.
     pub collisions: u64,
-    /// The first of them.
-    pub first_collision: Option<Collision>,
 }

@@ -59,6 +59,8 @@ pub struct Situation {
     pub name: String,
     /// What it does.
     pub scenario: Scenario,
+    /// What the beginnings of faults count from, as a window has it: `jump2`; empty for the run.
+    pub after: String,
     /// Earliest beginning of a fault, µs.
     pub from: u64,
     /// Latest, µs.
@@ -99,7 +101,7 @@ impl Crossing {
         };
         let faults: Vec<Vec<String>> = faults.iter().map(split).collect();
         for what in faults.iter().flatten() {
-            planned(what, 0, 0)?;
+            planned(what, "", 0, 0)?;
         }
         Ok(Self {
             situations,
@@ -141,7 +143,10 @@ impl Crossing {
         let faults_of = &self.faults[(place % faults) as usize];
         let last = self.lasts[(place / faults % lasts) as usize];
         let begin = situation.from + place / faults / lasts * situation.step;
-        let faults = faults_of.iter().map(|what| planned(what, begin, last));
+        let after = &situation.after;
+        let faults = faults_of
+            .iter()
+            .map(|what| planned(what, after, begin, last));
         Some(Case {
             case: number,
             situation: situation.name.clone(),
@@ -164,15 +169,20 @@ impl Crossing {
     }
 }
 
-/// The fault `what` from `begin` for `last` µs, or for ever.
+/// The fault `what` from `begin` for `last` µs, or for ever; `begin` counts from the run, or from what `after` says.
 ///
 /// # Errors
 /// It is not a fault.
-pub fn planned(what: &str, begin: u64, last: u64) -> Result<Fault, FaultError> {
+pub fn planned(what: &str, after: &str, begin: u64, last: u64) -> Result<Fault, FaultError> {
     let ms = |us: u64| us as f64 / 1e3;
-    let text = match last {
-        0 => format!("{what}@{}ms", ms(begin)),
-        _ => format!("{what}@{}ms..{}ms", ms(begin), ms(begin + last)),
+    let from = match after {
+        "" => format!("{}ms", ms(begin)),
+        _ => format!("{after}+{}ms", ms(begin)),
     };
-    text.parse()
+    let until = match (after, last) {
+        (_, 0) => String::new(),
+        ("", _) => format!("..{}ms", ms(begin + last)),
+        _ => format!("..+{}ms", ms(last)),
+    };
+    format!("{what}@{from}{until}").parse()
 }

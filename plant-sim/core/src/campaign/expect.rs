@@ -14,6 +14,12 @@
 //! | the same for 9 samples or more | 8 samples | nothing gets through: the drives switch off as if it were lost |
 //! | nobody acknowledges feedback for 9 samples or more | 8 samples | after 16 attempts the drives are passive, and the same frame comes again and again: three repeated frames |
 //! | nobody acknowledges commands for 9 samples or more | 9 samples | one more command gets through once the controller is passive; it is repeated, and keeps all later ones waiting |
+//! | a node babbles, or the wires are held, for up to 2 samples | the same as without it | frames wait, and even a bus-off is over within 5 samples |
+//! | the same for 9 samples or more | 8 samples | nothing gets through |
+//! | drives or controller without power for 9 samples or more | 8 samples | as if they were silent: they start with torque off |
+//! | a drive without power for 2 samples or more | 4 samples | the next feedback says so, and one sample to answer |
+//! | the clock of the drives stands still for 9 samples or more | 8 samples | no feedback, so no commands: the drives let go by a clock of their own |
+//! | a clock within 100 ppm, as every crystal is | the same as without it | nobody else counts on a time |
 //! | nobody tells a CAN controller to recover | the same as without it | nothing by itself: only after a bus-off |
 //!
 //! Whatever else breaks is judged by its effect: see [`super::bounds`].
@@ -23,12 +29,17 @@ use protocol::schema::Content;
 use protocol::time::{Duration, Instant, Period};
 
 use super::bounds::FOLLOWING_ERROR;
+use super::spells::Spell;
 use crate::bus::ErrorKind;
-use crate::faults::{Fault, FrameFault, What};
-use crate::plant::defect::EncoderDefect;
+use crate::clock::ClockDefect;
+use crate::faults::{FrameFault, What};
+use crate::plant::defect::{EncoderDefect, MotorDefect};
 
 /// Noise of a sound encoder, rad and m: two of its counts at the shoulder.
 const SOUND_NOISE: f64 = 1.2e-6;
+
+/// What a crystal may be off by.
+const SOUND_CLOCK: f64 = 1e-4;
 
 /// Samples for which the drives hold a command.
 const HOLD_SAMPLES: u32 = 5;
@@ -45,8 +56,9 @@ pub enum Expected {
 }
 
 /// What has to follow from these faults together.
-pub fn expected(faults: &[Fault], period: Period) -> Expected {
-    let each = faults.iter().map(|fault| of(fault, period));
+pub fn expected(faults: &[Spell], period: Period) -> Expected {
+    let begun = faults.iter().filter(|fault| fault.from < Instant::MAX);
+    let each = begun.map(|fault| of(fault, period));
     each.fold(Expected::Survived, |all, one| match (all, one) {
         (Expected::DetectedBy(a), Expected::DetectedBy(b)) => Expected::DetectedBy(a.min(b)),
         (first @ Expected::DetectedBy(_), _) | (_, first @ Expected::DetectedBy(_)) => first,
@@ -55,7 +67,7 @@ pub fn expected(faults: &[Fault], period: Period) -> Expected {
     })
 }
 
-fn of(fault: &Fault, period: Period) -> Expected {
+fn of(fault: &Spell, period: Period) -> Expected {
     let lasts = fault.until.since(fault.from);
     let samples = |count: u32| period.duration() * count;
     // A fault of up to `few` samples is survived, one of `enough` is detected within `limit`.
@@ -70,7 +82,11 @@ fn of(fault: &Fault, period: Period) -> Expected {
     };
     match fault.what {
         What::Silent(Node::Drives) => by_length(2, 9, 8),
-        What::Silent(Node::Controller) => no_survival(by_length(0, 9, 8)),
+        What::Silent(Node::Controller) | What::Dead(_) => no_survival(by_length(0, 9, 8)),
+        What::Babbling(_) | What::Wires(_) => by_length(2, 9, 8),
+        What::Motor(_, MotorDefect::Dip) => no_survival(by_length(0, 2, 4)),
+        What::Clock(ClockDefect::Misses(1.0)) => no_survival(by_length(0, 9, 8)),
+        What::Clock(ClockDefect::Drift(share)) if share.abs() <= SOUND_CLOCK => Expected::Survived,
         What::Frames(info, kind) => match (info.content, kind) {
             (_, FrameFault::Duplicate) => Expected::Survived,
             (Content::Feedback, FrameFault::Loss(1.0)) => by_length(2, 9, 8),
@@ -112,11 +128,18 @@ fn no_survival(expected: Expected) -> Expected {
 }
 
 /// How late a fault of the link makes a command that its sender sent in time and the drives still take.
-pub(super) fn lateness(faults: &[Fault], period: Period) -> Duration {
-    let late = |fault: &Fault| match fault.what {
-        What::Attempts(..) | What::Misreads(..) => is_taken(period),
+pub(super) fn lateness(faults: &[Spell], period: Period) -> Duration {
+    let late = |fault: &Spell| match fault.what {
+        What::Attempts(..)
+        | What::Misreads(..)
+        | What::Babbling(_)
+        | What::Wires(_)
+        | What::Foreign(..)
+        | What::Dead(_)
+        | What::Clock(_) => is_taken(period),
         What::Frames(info, kind) if info.content == Content::Command => match kind {
             FrameFault::Delay(s) | FrameFault::Jitter(s) => Duration::from_seconds(s),
+            FrameFault::Reorder(_) => period.duration() * 2,
             FrameFault::Replay(back) => period.duration() * back as u32,
             _ => Duration::ZERO,
         },
@@ -131,15 +154,11 @@ pub(super) fn is_taken(period: Period) -> Duration {
     period.duration() * (HOLD_SAMPLES + 1)
 }
 
-/// Causes that leave the loops to be trusted: the brake has closed before torque goes off.
+/// Causes that leave the loops to be trusted: the arm has stopped before the brake closes, and the brake has closed before torque goes
+/// off. A drive in fault gets the brake at once, which may still have to stop the lift when torque goes off.
 pub(super) fn stops_under_control(cause: Cause) -> bool {
     matches!(
         cause,
-        Cause::FeedbackLost
-            | Cause::Reordered
-            | Cause::Corrupted
-            | Cause::SoftLimit
-            | Cause::EStop
-            | Cause::DriveFault
+        Cause::FeedbackLost | Cause::Reordered | Cause::Corrupted | Cause::SoftLimit | Cause::EStop
     )
 }

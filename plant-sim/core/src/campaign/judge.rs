@@ -11,17 +11,17 @@ use protocol::messages::{
 use protocol::time::{Duration, Instant, Period};
 
 use super::bounds::{Bounds, SAMPLES_TO_REPORT, STANDING};
-use super::expect::{Expected, expected, is_taken, lateness, stops_under_control};
+use super::expect::{Expected, stops_under_control};
 use super::lift::Lift;
-use super::verdict::{Requirement, Verdict};
-use crate::faults::What;
+use super::newest::Newest;
+use super::spells::Spells;
+use super::verdict::{Requirement, Verdict, round};
 use crate::maths::square;
+use crate::model::Payload;
 use crate::observer::{Observer, PlantState, Truth};
 use crate::setup::RunConfig;
 use crate::world::CellEvent;
 
-/// Joint speed below which an axis counts as at rest, rad/s and m/s.
-const RESTING: f64 = 1e-3;
 /// J that energies may differ by: a tenth of what a hand feels.
 const ENERGY_TOLERANCE: f64 = 0.1;
 
@@ -38,6 +38,8 @@ struct Mark {
 pub struct Judge {
     period: Period,
     bounds: Bounds,
+    faults: Spells,
+    payload: Option<Payload>,
     /// Beginning of the first fault; the end of time without one.
     onset: Instant,
     expected: Expected,
@@ -46,11 +48,7 @@ pub struct Judge {
     /// Longest time from a report to the last command that does not know of it.
     reaction: Duration,
     missed: BTreeSet<Requirement>,
-    /// The newest command, its sender being alive.
-    control: ControlWord,
-    /// The sample that it answers, and its time.
-    answered: Option<u32>,
-    commanded: Instant,
+    newest: Newest,
     /// Counter and sequence number of the operator's last request.
     request: (u8, u8),
     report: Option<(Instant, Cause)>,
@@ -84,21 +82,18 @@ impl Judge {
     pub fn new(config: &RunConfig) -> Self {
         let scenario = &config.scenario;
         let period = Period::of_rate(scenario.rate_hz);
-        let onset = scenario.faults.iter().map(|fault| fault.from).min();
-        Self {
+        let faults = Spells::new(&scenario.faults, period);
+        let mut judge = Self {
             period,
             bounds: Bounds::new(&config.actual, period.duration().seconds()),
-            onset: onset.unwrap_or(Instant::MAX),
-            expected: expected(&scenario.faults, period),
-            torque_holds: scenario
-                .faults
-                .iter()
-                .any(|fault| fault.what == What::BrakeStuck),
-            reaction: period.duration() + lateness(&scenario.faults, period),
+            onset: Instant::MAX,
+            expected: Expected::Survived,
+            torque_holds: faults.leave_the_brake_open(),
+            reaction: period.duration() + faults.lateness(),
+            payload: None,
             missed: BTreeSet::new(),
-            control: ControlWord::EMPTY,
-            answered: None,
-            commanded: Instant::ORIGIN,
+            newest: Newest::new(period, !faults.lose_count()),
+            faults,
             request: (0, 0),
             report: None,
             escalated: false,
@@ -116,6 +111,22 @@ impl Judge {
             rest: None,
             mode: Mode::Boot,
             survived: false,
+        };
+        judge.look_forward();
+        judge.weigh();
+        judge
+    }
+
+    /// What to expect, as far as the times of the faults are known.
+    fn look_forward(&mut self) {
+        self.onset = self.onset.min(self.faults.onset());
+        self.expected = self.faults.expected();
+    }
+
+    /// What is at the flange is known, or may become so.
+    fn weigh(&mut self) {
+        if let Some(burden) = self.faults.burden(self.payload) {
+            self.bounds.carry(&burden);
         }
     }
 
@@ -156,11 +167,12 @@ impl Judge {
         let since = |time: f64| Some(round((time - onset) * 1e3));
         self.judge_fall();
         let end = self.last.map_or(0.0, |last| last.t);
-        let is_commanded = end - self.commanded.seconds() < 5.0 * self.period.duration().seconds();
+        let is_commanded =
+            end - self.newest.time.seconds() < 5.0 * self.period.duration().seconds();
         if self.report.is_some()
             && !self.torque_holds
             && is_commanded
-            && self.control.contains(ControlWord::TORQUE_ENABLE)
+            && self.newest.control.contains(ControlWord::TORQUE_ENABLE)
         {
             self.miss(Requirement::Standstill);
         }
@@ -199,13 +211,9 @@ impl Judge {
         if !self.bounds.allows_torque(&command.torque) {
             self.miss(Requirement::Torque);
         }
-        // One that was overtaken or held up on its way does nothing any more.
-        let is_overtaken = self.answered.is_some_and(|newest| command.sample < newest);
-        let answers = self.period.sample(command.sample.into());
-        if is_overtaken || time.since(answers) > is_taken(self.period) {
+        let Some(before) = self.newest.take(time, command) else {
             return;
-        }
-        self.answered = Some(command.sample);
+        };
         let normal = control.contains(ControlWord::TORQUE_ENABLE)
             && control.contains(ControlWord::BRAKE_RELEASE)
             && !control.contains(ControlWord::QUICK_STOP);
@@ -218,12 +226,10 @@ impl Judge {
         // A fault that has switched torque off keeps it off.
         if self.report.is_some()
             && control.contains(ControlWord::TORQUE_ENABLE)
-            && !self.control.contains(ControlWord::TORQUE_ENABLE)
+            && !before.contains(ControlWord::TORQUE_ENABLE)
         {
             self.miss(Requirement::Latch);
         }
-        self.control = control;
-        self.commanded = time;
     }
 
     fn watch_limits(&mut self, truth: &Truth) {
@@ -251,7 +257,7 @@ impl Judge {
             self.fastest = self.fastest.max(way / self.period.duration().seconds());
         }
         self.energy = self.energy.max(energy);
-        if is_moving(plant) {
+        if plant.is_moving() {
             self.moving = plant.t + self.period.duration().seconds();
         }
         if energy > self.bounds.energy_limit(&plant.q) {
@@ -297,8 +303,8 @@ impl Judge {
         }
         // Torque has been off for a whole sample at the next one.
         let off = self.off.get_or_insert(now);
-        if on_stop {
-            // What an end stop gives back depends on the steps in which the plant takes the impact.
+        if on_stop || self.faults.catch_the_tool() {
+            // What an end stop, or what has caught the tool, gives back depends on the steps in which the plant takes the impact.
             off.energy = now.energy;
         }
         let fallen = self.bounds.weight_work(off.lift, now.lift);
@@ -347,13 +353,13 @@ impl Observer for Judge {
 
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         let plant = &truth.plant;
-        let is_powered = self.control.contains(ControlWord::TORQUE_ENABLE);
+        let is_powered = self.newest.control.contains(ControlWord::TORQUE_ENABLE);
         self.mode = truth.mind.mode;
         if is_powered && plant.tau == [0.0; 4] && self.last.is_some_and(|last| last.tau != [0.0; 4])
         {
             self.cut.get_or_insert(plant.t);
         }
-        if is_powered && !self.is_detected() {
+        if is_powered && !self.is_detected() && truth.mind.knows_where() {
             self.watch_limits(truth);
         }
         let now = Instant::ORIGIN + Duration::from_seconds(plant.t);
@@ -370,7 +376,7 @@ impl Observer for Judge {
         }
         if let Some(rest) = &self.rest {
             let moved = (0..4).any(|i| (plant.q[i] - rest.q[i]).abs() > STANDING);
-            if moved {
+            if moved && !self.faults.move_the_arm() {
                 self.missed.insert(Requirement::Still);
             }
         }
@@ -380,16 +386,13 @@ impl Observer for Judge {
 
     fn cell_event(&mut self, event: &CellEvent) {
         if let CellEvent::Attach(payload) = event {
-            self.bounds.carry(payload);
+            self.payload = Some(*payload);
+            self.weigh();
         }
     }
-}
 
-fn is_moving(plant: &PlantState) -> bool {
-    plant.qd.iter().any(|qd| qd.abs() > RESTING)
-}
-
-/// To thousandths: what a line of results needs.
-fn round(value: f64) -> f64 {
-    (value * 1e3).round() / 1e3
+    fn fault(&mut self, number: usize, from: Instant, until: Instant) {
+        self.faults.retime(number, from, until);
+        self.look_forward();
+    }
 }

@@ -74,3 +74,8 @@ pub struct Verdict {
     /// How far the lift went below its path, or below where it was when the fault was detected, mm.
     pub drop_mm: Option<f64>,
 }
+
+/// To thousandths: what a line of results needs.
+pub(super) fn round(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}

@@ -3,11 +3,14 @@
 use std::collections::VecDeque;
 
 use oorandom::Rand64;
+use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::Node;
+use protocol::messages::{Message, Nmt, Node};
 use protocol::time::Instant;
 
-use super::{Fault, FrameFault, What, duration};
+use super::impostor::like;
+use super::watch::Planned;
+use super::{FrameFault, What, duration};
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::world::World;
 
@@ -18,27 +21,33 @@ pub struct Faulty<P> {
     node: Node,
     faults: Vec<Suffered>,
     random: Rand64,
+    /// Whether it had no power at the last call.
+    was_dead: bool,
     /// What the node has sent in the current call; empty between calls.
     sent: Outbox,
 }
 
-/// A fault of one message's frames, or the silence of the node.
+/// A fault of one message's frames, or of the node.
 #[derive(Debug)]
 struct Suffered {
-    fault: Fault,
-    /// Of a replay: the last frames of the message, as many as it goes back; the newest last.
+    fault: Planned,
+    /// Of a replay: the last frames of the message, as many as it goes back; the newest last. Of reordering: the frame that is
+    /// held back.
     history: VecDeque<CanFrame>,
+    /// Of losses in bursts: whether one is going on.
+    in_burst: bool,
 }
 
 impl<P: Peer> Faulty<P> {
     /// Wraps `peer`, which is `node`, in those faults that concern its frames.
-    pub fn new(peer: P, node: Node, faults: &[Fault], seed: u64) -> Self {
+    pub fn new(peer: P, node: Node, faults: &[Planned], seed: u64) -> Self {
         let mut faulty = Self {
             peer,
             node,
             faults: Vec::new(),
             // Each node draws from its own sequence, so that the frames of one do not change the faults of another.
             random: Rand64::new(u128::from(seed) << 8 | node as u128),
+            was_dead: false,
             sent: Outbox::new(),
         };
         for fault in faults {
@@ -48,16 +57,17 @@ impl<P: Peer> Faulty<P> {
     }
 
     /// Adds a fault, if it concerns the frames of this node.
-    pub(crate) fn suffer_also(&mut self, fault: &Fault) {
+    pub(crate) fn suffer_also(&mut self, fault: &Planned) {
         let concerns = match fault.what {
             What::Frames(info, _) => info.sender.is_none_or(|sender| sender == self.node),
-            What::Silent(silent) => silent == self.node,
+            What::Silent(node) | What::Dead(node) => node == self.node,
             _ => false,
         };
         if concerns {
             self.faults.push(Suffered {
                 fault: fault.clone(),
                 history: VecDeque::new(),
+                in_burst: false,
             });
         }
     }
@@ -72,17 +82,31 @@ impl<P: Peer> Faulty<P> {
         &mut self.peer
     }
 
-    fn is_silent(&self, now: Instant) -> bool {
+    fn is(&self, what: What, now: Instant) -> bool {
         self.faults
             .iter()
-            .any(|Suffered { fault, .. }| matches!(fault.what, What::Silent(_)) && fault.acts(now))
+            .any(|Suffered { fault, .. }| fault.what == what && fault.acts(now))
+    }
+
+    /// Starts the node anew, as network management does.
+    fn restart(&mut self, now: Instant, world: &mut World) -> Result<(), PeerError> {
+        let reset = Message::Nmt(Nmt::reset(self.node));
+        let Ok(reset) = codec::encode(&reset, 0) else {
+            return Ok(());
+        };
+        self.peer.poll(now, Some(&reset), world, &mut Outbox::new())
     }
 
     /// What becomes of a frame that the node sends at `time`.
     fn suffer(&mut self, time: Instant, frame: CanFrame, out: &mut Outbox) {
         let first = out.len();
         out.push((time, frame));
-        for Suffered { fault, history } in &mut self.faults {
+        for Suffered {
+            fault,
+            history,
+            in_burst,
+        } in &mut self.faults
+        {
             let What::Frames(info, kind) = fault.what else {
                 continue;
             };
@@ -97,10 +121,34 @@ impl<P: Peer> Faulty<P> {
                     old = history.pop_front();
                 }
             }
+            if matches!(kind, FrameFault::Reorder(_))
+                && let Some(held) = history.pop_front()
+            {
+                out.push((time, held));
+                continue;
+            }
             if !fault.acts(time) {
                 continue;
             }
             match kind {
+                FrameFault::Burst(share, length) => {
+                    // The chain of Gilbert: a burst ends after `length` frames on average, and `share` of all are in one.
+                    let ends = 1.0 / length;
+                    let changes = if *in_burst {
+                        ends
+                    } else {
+                        ends * share / (1.0 - share)
+                    };
+                    *in_burst ^= self.random.rand_float() < changes;
+                    if *in_burst {
+                        out.truncate(first);
+                    }
+                }
+                FrameFault::Reorder(share) => {
+                    if self.random.rand_float() < share {
+                        history.extend(out.drain(first..).map(|(_, frame)| frame));
+                    }
+                }
                 FrameFault::Loss(share) => {
                     if self.random.rand_float() < share {
                         out.truncate(first);
@@ -144,12 +192,7 @@ fn flip(frame: &mut CanFrame, random: &mut Rand64) {
     let bit = random.rand_range(0..bits) as usize;
     let mut data = frame.data().to_vec();
     data[bit / 8] ^= 1 << (bit % 8);
-    let flipped = if frame.is_fd() {
-        CanFrame::fd(frame.id(), &data, frame.brs())
-    } else {
-        CanFrame::classical(frame.id(), &data)
-    };
-    *frame = flipped.unwrap_or(*frame);
+    *frame = like(frame, &data);
 }
 
 impl<P: Peer> Peer for Faulty<P> {
@@ -167,7 +210,12 @@ impl<P: Peer> Peer for Faulty<P> {
         if self.faults.is_empty() {
             return self.peer.poll(now, received, world, out);
         }
-        let silent = self.is_silent(now);
+        let dead = self.is(What::Dead(self.node), now);
+        if dead != self.was_dead {
+            self.was_dead = dead;
+            self.restart(now, world)?;
+        }
+        let silent = dead || self.is(What::Silent(self.node), now);
         if silent && received.is_some() {
             return Ok(());
         }

@@ -3,31 +3,47 @@
 use protocol::frame::CanFrame;
 use protocol::time::Instant;
 
-use super::{Fault, What};
+use super::What;
+use super::watch::Planned;
 use crate::peer::{Outbox, Peer, PeerError};
-use crate::plant::Plant;
+use crate::plant::defect::LoadDefect;
 use crate::world::World;
 
 /// Breaks parts of the robot when their time comes, and repairs them. It is a peer only to be called at the right times:
 /// it neither receives nor sends frames.
 #[derive(Debug)]
 pub struct Injector {
-    /// Pending changes, the latest first.
-    todo: Vec<(Instant, What, Deed)>,
+    parts: Vec<Part>,
     seed: u64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Deed {
-    Break,
-    Repair,
+/// A part of the robot with its fault.
+#[derive(Debug)]
+struct Part {
+    fault: Planned,
+    is_broken: bool,
+    /// Beginning of the last window in which it was broken.
+    since: Option<Instant>,
+}
+
+impl Part {
+    /// When it breaks or is repaired next.
+    fn due(&self) -> Option<Instant> {
+        let (from, until) = self.fault.window();
+        let due = match self.is_broken {
+            true => until,
+            false if self.since == Some(from) || until <= from => Instant::MAX,
+            false => from,
+        };
+        (due < Instant::MAX).then_some(due)
+    }
 }
 
 impl Injector {
-    /// An injector of those faults that concern the robot; `seed` seeds the noise of encoders.
-    pub fn new(faults: &[Fault], seed: u64) -> Self {
+    /// An injector of those faults that concern the robot; `seed` seeds what is random in them.
+    pub fn new(faults: &[Planned], seed: u64) -> Self {
         let mut injector = Self {
-            todo: Vec::new(),
+            parts: Vec::new(),
             seed,
         };
         for fault in faults {
@@ -37,50 +53,40 @@ impl Injector {
     }
 
     /// Adds a fault, if it concerns the robot.
-    pub(crate) fn inject_also(&mut self, fault: &Fault) {
-        let Fault {
-            what, from, until, ..
-        } = *fault;
-        let of_robot = !matches!(
-            what,
-            What::Frames(..)
-                | What::Silent(_)
-                | What::Attempts(..)
-                | What::Misreads(..)
-                | What::NoRecovery(_)
+    pub(crate) fn inject_also(&mut self, fault: &Planned) {
+        let of_robot = matches!(
+            fault.what,
+            What::Encoder(..) | What::Motor(..) | What::Brake(_) | What::Load(_) | What::Clock(_)
         );
-        if !of_robot {
-            return;
+        if of_robot {
+            self.parts.push(Part {
+                fault: fault.clone(),
+                is_broken: false,
+                since: None,
+            });
         }
-        let deeds = [(from, what, Deed::Break), (until, what, Deed::Repair)];
-        self.todo
-            .extend(deeds.into_iter().filter(|(time, ..)| *time < Instant::MAX));
-        self.todo.sort_by_key(|(time, ..)| std::cmp::Reverse(*time));
     }
+}
 
-    fn act(&self, plant: &mut Plant, what: What, deed: Deed) {
-        let is_broken = deed == Deed::Break;
-        match what {
-            What::Encoder(axis, defect) => {
-                plant.break_encoder(axis, is_broken.then_some(defect), self.seed);
-            }
-            What::Motor(axis, defect) => plant.break_motor(axis, is_broken.then_some(defect)),
-            What::BrakeStuck => plant.break_brake(is_broken),
-            // A payload that has fallen out does not come back.
-            What::PayloadDropped if is_broken => plant.release(),
-            What::PayloadDropped
-            | What::Frames(..)
-            | What::Silent(_)
-            | What::Attempts(..)
-            | What::Misreads(..)
-            | What::NoRecovery(_) => {}
+fn act(world: &mut World, what: What, is_broken: bool, seed: u64) {
+    let plant = &mut world.plant;
+    match what {
+        What::Encoder(axis, defect) => {
+            plant.break_encoder(axis, is_broken.then_some(defect), seed);
         }
+        What::Motor(axis, defect) => plant.break_motor(axis, is_broken.then_some(defect)),
+        What::Brake(defect) => plant.break_brake(is_broken.then_some(defect)),
+        // A payload that has fallen out does not come back.
+        What::Load(LoadDefect::Dropped) if is_broken => plant.release(),
+        What::Load(defect) => plant.disturb_load(defect, is_broken),
+        What::Clock(defect) => world.clock = is_broken.then(|| defect.seeded(seed)),
+        _ => {}
     }
 }
 
 impl Peer for Injector {
     fn wake(&self) -> Option<Instant> {
-        self.todo.last().map(|(time, ..)| *time)
+        self.parts.iter().filter_map(Part::due).min()
     }
 
     fn poll(
@@ -94,8 +100,17 @@ impl Peer for Injector {
             return Ok(());
         }
         world.plant.advance_to(now.nanos());
-        while let Some((_, what, deed)) = self.todo.pop_if(|(time, ..)| *time <= now) {
-            self.act(&mut world.plant, what, deed);
+        // What is repaired at the instant at which it breaks in another way is broken afterwards.
+        for repairs in [true, false] {
+            for part in &mut self.parts {
+                if part.is_broken == repairs && part.due().is_some_and(|due| due <= now) {
+                    part.is_broken = !repairs;
+                    if part.is_broken {
+                        part.since = Some(part.fault.window().0);
+                    }
+                    act(world, part.fault.what, part.is_broken, self.seed);
+                }
+            }
         }
         Ok(())
     }

@@ -19,6 +19,8 @@ pub struct Brake {
     closed: bool,
     due: Option<u64>,
     sticking: bool,
+    /// What it takes longer than it should, ns.
+    delay: u64,
 }
 
 impl Brake {
@@ -42,6 +44,7 @@ impl Brake {
             closed: true,
             due: None,
             sticking: true,
+            delay: 0,
         }
     }
 
@@ -49,13 +52,12 @@ impl Brake {
     pub fn command(&mut self, engaged: bool, now: u64) {
         if engaged != self.engaged {
             self.engaged = engaged;
-            self.due = Some(
-                now + if engaged {
-                    Self::ENGAGE_NS
-                } else {
-                    Self::RELEASE_NS
-                },
-            );
+            let takes = if engaged {
+                Self::ENGAGE_NS
+            } else {
+                Self::RELEASE_NS
+            };
+            self.due = Some(now + takes + self.delay);
         }
     }
 
@@ -71,6 +73,19 @@ impl Brake {
             self.closed = self.engaged;
             self.sticking &= self.closed;
         }
+    }
+
+    /// Takes so much longer (ns) from the next command on.
+    pub(super) fn delay(&mut self, ns: u64) {
+        self.delay = ns;
+    }
+
+    /// Opens or closes at once, without having been told.
+    pub(super) fn force(&mut self, closed: bool) {
+        self.engaged = closed;
+        self.closed = closed;
+        self.due = None;
+        self.sticking &= closed;
     }
 
     /// Whether it was last commanded to close.

@@ -12,7 +12,7 @@ pub struct Energy {
     pub kinetic: f64,
     /// Zero with all mass in the plane of frame 0.
     pub potential: f64,
-    /// In the springs of the end stops.
+    /// In the springs of the end stops, and in one that has caught the flange.
     pub elastic: f64,
     /// Work that the motors have done since the beginning.
     pub motor_work: f64,
@@ -28,7 +28,7 @@ impl Plant {
         Energy {
             kinetic: self.arm.kinetic_energy(&at, &self.qd) + rotors,
             potential: self.arm.potential_energy(&at),
-            elastic: self.stops.energy(&self.q),
+            elastic: self.stops.energy(&self.q) + self.defects.elastic(&self.arm, &at),
             motor_work: self.ledger[4],
             lost: self.ledger[5],
         }

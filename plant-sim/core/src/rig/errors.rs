@@ -5,34 +5,46 @@ use std::io;
 use protocol::messages::Node;
 
 use super::Rig;
-use crate::bus::{Disturbance, Disturbed, NodeId};
-use crate::faults::{Fault, What};
+use crate::bus::{Affliction, Disturbance, Disturbed, NodeId};
+use crate::faults::{Impostor, Planned, What};
 use crate::observer::Observer;
 
 impl Rig<'_> {
-    /// Plans a fault, if it concerns the bus. Its random numbers come from `seed`.
-    pub fn spoil(&mut self, fault: &Fault, seed: u64) {
-        let (what, share) = match fault.what {
-            What::Attempts(info, kind, share) => (Disturbed::Message(info, kind), share),
-            What::Misreads(name, share) => match self.named(name) {
-                Some(node) => (Disturbed::Reader(node), share),
-                None => return,
-            },
-            What::NoRecovery(name) => {
-                if let Some(node) = self.named(name) {
-                    self.bus.leave_off(node, fault.from, fault.until);
-                }
-                return;
+    /// Carries out a fault, if it concerns the bus. Its random numbers come from `seed`.
+    pub fn spoil(&mut self, fault: &Planned, seed: u64) {
+        if let Some(impostor) = Impostor::new(fault, self.period, seed) {
+            self.attach(impostor);
+            return;
+        }
+        let (from, until) = fault.window();
+        let disturbed = match fault.what {
+            What::Attempts(info, kind, share) => Some((Disturbed::Message(info, kind), share)),
+            What::Misreads(name, share) => {
+                let node = self.named(name);
+                node.map(|node| (Disturbed::Reader(node), share))
             }
-            _ => return,
+            _ => None,
         };
-        let disturbance = Disturbance {
-            what,
-            share,
-            from: fault.from,
-            until: fault.until,
+        let afflicted = match fault.what {
+            What::NoRecovery(name) => self.named(name).map(Affliction::NoRecovery),
+            What::Babbling(name) => self.named(name).map(Affliction::Babbling),
+            What::Wires(level) => Some(Affliction::Wires(level)),
+            _ => None,
         };
-        self.bus.disturb(disturbance, seed);
+        let wrong = if let Some((what, share)) = disturbed {
+            let disturbance = Disturbance {
+                what,
+                share,
+                from,
+                until,
+            };
+            self.bus.disturb(disturbance, seed)
+        } else if let Some(what) = afflicted {
+            self.bus.afflict(what, from, until)
+        } else {
+            return;
+        };
+        self.faults.follow(fault, wrong);
     }
 
     fn named(&self, name: Node) -> Option<NodeId> {

@@ -137,7 +137,7 @@ quantities! {
     Overruns = "overruns", "", Part;
     /// Faults that the controller reports.
     Faults = "faults", "", Part;
-    /// Frames lost to a full transmit queue or an identifier collision.
+    /// Frames lost to a full transmit queue.
     FramesLost = "frames_lost", "", Run;
     /// Length of the run, s.
     SimTime = "sim_time_s", "s", Run;

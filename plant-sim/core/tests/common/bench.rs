@@ -1,17 +1,12 @@
 //! A bus of some nodes, and what is sent on it.
 
 use protocol::frame::CanFrame;
-use protocol::table::COMMAND;
 use protocol::time::Instant;
 use protocol::wire::BitTiming;
-use sim::bus::{BuiltinBus, Delivery, Disturbed, ErrorKind, NodeId, Report};
+use sim::bus::{BuiltinBus, Delivery, NodeId, Report};
 
 pub(crate) fn ns(ns: u64) -> Instant {
     Instant::from_nanos(ns)
-}
-
-pub(crate) fn attempts(kind: ErrorKind) -> Disturbed {
-    Disturbed::Message(&COMMAND, kind)
 }
 
 /// A bus of some nodes, and frames that are sent on it.

@@ -62,8 +62,8 @@ pub(crate) struct ConfigArgs {
     /// Control rate. Short for --set rate_hz=HZ.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = number)]
     rate: Option<f64>,
-    /// Break something: PLACE[:AXIS]:KIND[=VALUE]@FROM[..UNTIL], such as encoder:elbow:stuck@0.4s or
-    /// command:loss=0.2@0.3s..0.5s. May be repeated; docs/faults.md lists the kinds.
+    /// Break something: PLACE[:AXIS]:KIND[=VALUE]@WINDOW, such as encoder:elbow:stuck@0.4s, command:loss=0.2@0.3s..0.5s,
+    /// motor:lift:dead@jump2+200ms..+50ms or brake:slow=0.2@while=moving. May be repeated; docs/faults.md lists the kinds.
     #[arg(long, value_name = "FAULT")]
     fault: Vec<Fault>,
     /// Seed of whatever is random in the faults. Short for --set seed=N.

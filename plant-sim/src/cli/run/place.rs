@@ -6,6 +6,8 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use link::{AddressError, LinkAddress, SlcanPeer};
 use plant_sim::qemu::{self, Channel};
+use protocol::messages::Node;
+use sim::faults::{Fault, What};
 
 use crate::cli::Failure;
 use crate::cli::values::image;
@@ -88,6 +90,25 @@ pub(super) enum Place<'a> {
     Qemu(qemu::Options),
     LockStep(&'a LinkAddress),
     RealTime(&'a LinkAddress),
+}
+
+impl Place<'_> {
+    /// Refuses what cannot break there.
+    pub(super) fn admit(&self, faults: &[Fault]) -> Result<(), Failure> {
+        for fault in faults {
+            let why = match (self, fault.what) {
+                (Place::LockStep(_) | Place::RealTime(_), What::Dead(Node::Controller)) => {
+                    "an external controller has a power supply of its own; allowed: controller:silent, or --controller qemu"
+                }
+                (Place::RealTime(_), What::Clock(_)) => {
+                    "in real time samples are taken by the clock of this machine; allowed without --real-time"
+                }
+                _ => continue,
+            };
+            return Err(Failure::usage(format!("fault {}: {why}", fault.text)));
+        }
+        Ok(())
+    }
 }
 
 impl PlaceArgs {

@@ -1,0 +1,104 @@
+//! The faults of a case, each with the time in which it is in effect.
+
+use protocol::messages::Node;
+use protocol::time::{Duration, Instant, Period};
+
+use super::expect::{Expected, expected, lateness};
+use crate::faults::{Fault, What};
+use crate::model::Payload;
+use crate::plant::defect::{BrakeDefect, LoadDefect, burdened};
+
+/// What breaks, and when: at the end of time as long as that is not known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spell {
+    /// What.
+    pub what: What,
+    /// Beginning.
+    pub from: Instant,
+    /// End; [`Instant::MAX`] for a fault that stays.
+    pub until: Instant,
+}
+
+/// Everything that breaks in a case.
+#[derive(Clone, Debug)]
+pub(super) struct Spells {
+    all: Vec<Spell>,
+    period: Period,
+}
+
+impl Spells {
+    pub(super) fn new(faults: &[Fault], period: Period) -> Self {
+        let spell = |fault: &Fault| {
+            let never = (Instant::MAX, Instant::MAX);
+            let (from, until) = fault.window.fixed(period).unwrap_or(never);
+            let what = fault.what;
+            Spell { what, from, until }
+        };
+        Self {
+            all: faults.iter().map(spell).collect(),
+            period,
+        }
+    }
+
+    /// The time of one is known, or changes.
+    pub(super) fn retime(&mut self, number: usize, from: Instant, until: Instant) {
+        if let Some(spell) = self.all.get_mut(number) {
+            (spell.from, spell.until) = (from, until);
+        }
+    }
+
+    /// Beginning of the first.
+    pub(super) fn onset(&self) -> Instant {
+        let begins = self.all.iter().map(|spell| spell.from);
+        begins.min().unwrap_or(Instant::MAX)
+    }
+
+    /// What has to follow.
+    pub(super) fn expected(&self) -> Expected {
+        expected(&self.all, self.period)
+    }
+
+    /// How late a command may be for them.
+    pub(super) fn lateness(&self) -> Duration {
+        lateness(&self.all, self.period)
+    }
+
+    fn any(&self, is: impl Fn(What) -> bool) -> bool {
+        self.all.iter().any(|spell| is(spell.what))
+    }
+
+    /// Whether the brake may be open where it should hold.
+    pub(super) fn leave_the_brake_open(&self) -> bool {
+        self.any(|what| {
+            matches!(
+                what,
+                What::Brake(BrakeDefect::Stuck | BrakeDefect::StuckOpen | BrakeDefect::Slow(_))
+            )
+        })
+    }
+
+    /// Whether the number of a sample may not tell its time.
+    pub(super) fn lose_count(&self) -> bool {
+        self.any(|what| matches!(what, What::Clock(_) | What::Dead(Node::Drives)))
+    }
+
+    /// Whether something may hold the tool.
+    pub(super) fn catch_the_tool(&self) -> bool {
+        self.any(|what| matches!(what, What::Load(LoadDefect::Caught(_))))
+    }
+
+    /// Whether something may move an arm without torque: a spring, or the weight of a lift that nothing holds.
+    pub(super) fn move_the_arm(&self) -> bool {
+        let opens = |what| matches!(what, What::Brake(BrakeDefect::StuckOpen));
+        self.catch_the_tool() || self.any(opens)
+    }
+
+    /// The most that may be at the flange, with this payload.
+    pub(super) fn burden(&self, payload: Option<Payload>) -> Option<Payload> {
+        let extra = self.all.iter().map(|spell| match spell.what {
+            What::Load(LoadDefect::Heavier(kg)) => kg,
+            _ => 0.0,
+        });
+        burdened(payload, extra.sum())
+    }
+}

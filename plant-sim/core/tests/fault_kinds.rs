@@ -1,0 +1,340 @@
+//! Kinds of faults of frames, nodes and clocks: each does what its row says, by a law or a count from elsewhere.
+
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
+#[path = "common/record.rs"]
+mod record;
+
+use std::collections::BTreeMap;
+
+use protocol::codec::{self, Encoder};
+use protocol::frame::CanFrame;
+use protocol::messages::{Cause, Command, ControlWord, Message, Mode, Node};
+use protocol::table;
+use protocol::time::{Duration, Instant};
+use record::{Record, run_of};
+use sim::faults::Faulty;
+use sim::peer::{Outbox, Peer, PeerError};
+use sim::rig::Rig;
+use sim::scenario::Scenario;
+use sim::setup::RunConfig;
+use sim::summary::Summary;
+use sim::world::{Mind, World};
+
+fn gate(fault: &str) -> (Summary, Record) {
+    let mut scenario = Scenario::built_in("gate").unwrap();
+    scenario.cycles = 1;
+    run_of(scenario, &[fault], 5)
+}
+
+fn cause(record: &Record) -> Cause {
+    let causes =
+        record
+            .frames
+            .iter()
+            .filter_map(|(_, frame)| match codec::decode(frame).ok()?.message {
+                Message::Emergency(_, emergency) => Some(emergency.cause),
+                _ => None,
+            });
+    causes.into_iter().next().unwrap_or(Cause::None)
+}
+
+/// Numbers the commands that it sends, one a call.
+struct Counter(u32, Encoder);
+
+impl Peer for Counter {
+    fn wake(&self) -> Option<Instant> {
+        None
+    }
+
+    fn poll(
+        &mut self,
+        now: Instant,
+        _: Option<&CanFrame>,
+        _: &mut World,
+        out: &mut Outbox,
+    ) -> Result<(), PeerError> {
+        let command = Command {
+            sample: self.0,
+            control: ControlWord::EMPTY,
+            torque: [0.0; 4],
+        };
+        self.0 += 1;
+        out.push((now, self.1.encode(&Message::Command(command)).unwrap()));
+        Ok(())
+    }
+}
+
+/// What is left of so many commands.
+fn survivors(fault: &str, count: u32, seed: u64) -> Vec<u32> {
+    let config = RunConfig::new(Scenario::built_in("gate").unwrap());
+    let config = config.rig().unwrap();
+    let planned = Rig::new(&config).plan(&fault.parse().unwrap());
+    let mut faulty = Faulty::new(
+        Counter(0, Encoder::default()),
+        Node::Controller,
+        &[planned],
+        seed,
+    );
+    let mut world = World {
+        plant: sim::plant::Plant::new(&config.actual, config.start),
+        mind: Mind::BLANK,
+        clock: None,
+        cell_events: Vec::new(),
+        outcome: None,
+    };
+    let mut out = Outbox::new();
+    for call in 0..count {
+        let now = Instant::ORIGIN + Duration::from_millis(1) * call;
+        faulty.poll(now, None, &mut world, &mut out).unwrap();
+    }
+    let number = |frame: &CanFrame| match codec::decode(frame).unwrap().message {
+        Message::Command(command) => command.sample,
+        _ => panic!("{frame}"),
+    };
+    out.iter().map(|(_, frame)| number(frame)).collect()
+}
+
+/// The chain of Gilbert: bursts have a geometric length of the mean that is asked for, and as many frames as asked for are in one. Both
+/// within five standard deviations; those of a share of a Markov chain are wider than of a coin by (1 + r) / (1 - r), with r its
+/// correlation from one frame to the next.
+#[test]
+fn bursts_are_those_of_gilbert() {
+    const COUNT: u32 = 200_000;
+    for (share, length) in [(0.2, 10.0), (0.05, 4.0), (0.5, 2.0)] {
+        let left = survivors(&format!("command:burst={share}/{length}@0s"), COUNT, 3);
+        let n = f64::from(COUNT);
+        let lost = (n - left.len() as f64) / n;
+        let (ends, begins) = (1.0 / length, share / (1.0 - share) / length);
+        let correlation: f64 = 1.0 - ends - begins;
+        let deviation =
+            (share * (1.0 - share) / n * (1.0 + correlation) / (1.0 - correlation)).sqrt();
+        assert!(
+            (lost - share).abs() < 5.0 * deviation,
+            "{share}/{length}: {lost}"
+        );
+        let gaps = left
+            .windows(2)
+            .map(|two| two[1] - two[0] - 1)
+            .filter(|gap| *gap > 0);
+        let mut lengths = BTreeMap::new();
+        gaps.for_each(|gap| *lengths.entry(gap).or_insert(0_u32) += 1);
+        let bursts = f64::from(lengths.values().sum::<u32>());
+        for least in 1..=12_u32 {
+            let found =
+                f64::from(lengths.range(least..).map(|(_, count)| *count).sum::<u32>()) / bursts;
+            let expected = (1.0 - ends).powi(least as i32 - 1);
+            let deviation = (expected * (1.0 - expected) / bursts).sqrt();
+            assert!(
+                (found - expected).abs() <= 5.0 * deviation,
+                "{share}/{length}, {least}: {found} {expected}"
+            );
+        }
+    }
+    assert_eq!(
+        survivors("command:burst=0.2/10@0s", 1000, 3),
+        survivors("command:burst=0.2/10@0s", 1000, 3)
+    );
+    assert_ne!(
+        survivors("command:burst=0.2/10@0s", 1000, 3),
+        survivors("command:burst=0.2/10@0s", 1000, 4)
+    );
+}
+
+/// By hand. One that is held back goes out behind the next one, also when the fault has ended meanwhile.
+#[test]
+fn reordered_frames_change_places() {
+    assert_eq!(survivors("command:reorder@0s", 6, 0), [1, 0, 3, 2, 5, 4]);
+    assert_eq!(survivors("command:reorder@0s", 5, 0), [1, 0, 3, 2]);
+    assert_eq!(
+        survivors("command:reorder@2ms..3ms", 6, 0),
+        [0, 1, 3, 2, 4, 5]
+    );
+    let some = survivors("command:reorder=0.2@0s", 1000, 1);
+    let mut sorted = some.clone();
+    sorted.sort_unstable();
+    assert!(some != sorted && sorted.windows(2).all(|two| two[0] < two[1]));
+}
+
+fn commands(record: &Record) -> Vec<CanFrame> {
+    let frames = record.frames.iter().map(|(_, frame)| *frame);
+    frames
+        .filter(|frame| table::COMMAND.identifies(frame))
+        .collect()
+}
+
+/// Frames that the controller has dropped.
+fn rejected(record: &Record) -> u16 {
+    let states = record.frames.iter().rev();
+    let mut counts = states.filter_map(|(_, frame)| match codec::decode(frame).ok()?.message {
+        Message::State(state) => Some(state.rejected),
+        _ => None,
+    });
+    counts.next().unwrap()
+}
+
+/// A foreign node without the protection, between the frames of the drives: what it sends is dropped and counted, and every command
+/// is the one of a run without it.
+#[test]
+fn a_poor_masquerade_changes_no_torque() {
+    let (_, without) = gate("payload:dropped@100s");
+    for fault in ["feedback:masquerade@300.5ms", "feedback:masquerade@300.7ms"] {
+        let (summary, with) = gate(fault);
+        assert!(summary.completed, "{fault}: {:?}", summary.error);
+        assert_eq!(commands(&with), commands(&without), "{fault}");
+        assert!(
+            rejected(&with) > rejected(&without) + 500,
+            "{fault}: {}",
+            rejected(&with)
+        );
+    }
+}
+
+/// At the same instant as the frames of the drives it destroys them, and its own: the arm stops.
+#[test]
+fn a_masquerade_on_the_beat_is_a_bus_error() {
+    let (summary, record) = gate("feedback:masquerade@400ms");
+    assert!(
+        !summary.completed && summary.bus_errors > 16,
+        "{}",
+        summary.bus_errors
+    );
+    assert_ne!(cause(&record), Cause::None);
+}
+
+/// With everything right there is nothing to tell it by: the controller takes the old positions for new ones. This is what is not
+/// promised.
+#[test]
+fn a_forged_frame_is_believed() {
+    let (sound, without) = gate("payload:dropped@100s");
+    let (summary, with) = gate("feedback:forged@400.5ms");
+    assert_ne!(commands(&with), commands(&without));
+    assert!(summary.tracking_error_mm.max > 100.0 * sound.tracking_error_mm.max);
+    assert!(
+        rejected(&with) > 400,
+        "the true ones come too late: {}",
+        rejected(&with)
+    );
+}
+
+/// The node's frames wait behind those that it sends without end; the drives let go as if it were silent.
+#[test]
+fn a_babbling_node_stops_the_arm() {
+    for node in ["drives", "controller", "operator"] {
+        let (summary, record) = gate(&format!("{node}:babbling@0.4s"));
+        assert!(!summary.completed && summary.at_rest, "{node}");
+        let off = record
+            .truths
+            .iter()
+            .find(|it| it.plant.t > 0.4 && it.plant.tau == [0.0; 4])
+            .unwrap();
+        // Five samples without a command, and the two around them.
+        assert!(off.plant.t < 0.4 + 0.0085, "{node}: {}", off.plant.t);
+        let (short, _) = gate(&format!("{node}:babbling@0.4s..0.402s"));
+        assert!(short.completed, "{node}: {:?}", short.error);
+    }
+}
+
+/// Without power there is no torque and no brake; with it the node starts where every run starts, and nothing moves by itself.
+#[test]
+fn a_node_without_power_starts_anew() {
+    let (summary, record) = gate("drives:dead@0.4s..0.5s");
+    assert!(!summary.completed && summary.at_rest);
+    let sample = |frame: &CanFrame| match codec::decode(frame).ok()?.message {
+        Message::Feedback(feedback) => Some(feedback.sample),
+        _ => None,
+    };
+    let after = record
+        .frames
+        .iter()
+        .filter(|(time, _)| time.seconds() > 0.4005);
+    let first = after
+        .clone()
+        .find_map(|(time, frame)| Some((time.seconds(), sample(frame)?)));
+    let (time, number) = first.unwrap();
+    assert!(
+        (0.5..0.502).contains(&time) && number <= 1,
+        "{time} {number}"
+    );
+
+    let (summary, record) = gate("controller:dead@0.4s..0.5s");
+    assert!(!summary.completed && summary.at_rest);
+    assert!(summary.error.unwrap().contains("started anew"));
+    let modes: Vec<Mode> = record
+        .truths
+        .iter()
+        .filter(|it| it.plant.t > 0.51)
+        .map(|it| it.mind.mode)
+        .collect();
+    assert!(
+        modes
+            .iter()
+            .all(|mode| matches!(mode, Mode::PreOperational | Mode::Ready)),
+        "{modes:?}"
+    );
+    let moved = record
+        .truths
+        .iter()
+        .rev()
+        .take(20)
+        .all(|it| it.plant.qd.iter().all(|qd| qd.abs() < 1e-3));
+    assert!(moved);
+}
+
+fn feedback_times(record: &Record) -> Vec<f64> {
+    let frames = record
+        .frames
+        .iter()
+        .filter(|(_, frame)| table::FEEDBACK.identifies(frame));
+    frames.map(|(time, _)| time.seconds()).collect()
+}
+
+/// A clock that is fast by a fiftieth has a period shorter by as much; the time of the frame on the bus differs by its stuff bits.
+#[test]
+fn a_clock_that_drifts_changes_the_period() {
+    for (drift, period) in [("0.02", 1.0 / 1.02), ("-0.02", 1.0 / 0.98), ("0", 1.0)] {
+        let (_, record) = gate(&format!("clock:drift={drift}@0.1s..0.2s"));
+        let times: Vec<f64> = feedback_times(&record)
+            .into_iter()
+            .filter(|t| (0.11..0.19).contains(t))
+            .collect();
+        let mean = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64 * 1e3;
+        assert!((mean - period).abs() < 2e-4, "{drift}: {mean}");
+    }
+}
+
+/// A tick that is lost is not counted. With a clock that stands still nobody answers, and the drives let go by another one.
+#[test]
+fn a_clock_that_misses_its_ticks() {
+    let (_, record) = gate("clock:misses@100ms..110ms");
+    let times = feedback_times(&record);
+    let gap = times
+        .windows(2)
+        .map(|two| two[1] - two[0])
+        .fold(0.0, f64::max);
+    assert!((gap - 0.011).abs() < 1e-4, "{gap}");
+    let (summary, record) = gate("clock:misses@0.4s");
+    assert!(!summary.completed && summary.at_rest);
+    let off = record
+        .truths
+        .iter()
+        .find(|it| it.plant.t > 0.4 && it.plant.tau == [0.0; 4])
+        .unwrap();
+    assert!(off.plant.t < 0.4 + 0.0085, "{}", off.plant.t);
+}
+
+/// The drives say that one of them is in fault, and the brake closes at once.
+#[test]
+fn a_dip_of_a_drive_is_reported_by_it() {
+    for axis in ["shoulder", "elbow", "lift", "wrist"] {
+        let (summary, record) = gate(&format!("motor:{axis}:dip@0.4s..0.42s"));
+        assert_eq!(cause(&record), Cause::DriveFault, "{axis}");
+        assert!(!summary.completed && summary.at_rest, "{axis}");
+    }
+}
