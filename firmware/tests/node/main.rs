@@ -16,3 +16,4 @@ mod reports;
 mod requests;
 mod stops;
 mod switching;
+mod wire;
