@@ -274,6 +274,14 @@ fn format_and_length_must_be_those_of_the_message() {
     }
 }
 
+/// Major, minor and patch of the version, a byte each.
+#[test]
+fn the_build_of_the_handshake_is_the_version() {
+    let parts = env!("CARGO_PKG_VERSION").split('.');
+    let build = parts.fold(0, |build, part| build * 256 + part.parse::<u32>().unwrap());
+    assert_eq!(table::HELLO.build, build);
+}
+
 #[test]
 fn every_emergency_stop_stops() {
     for reason in 0..=255 {
