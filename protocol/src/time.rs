@@ -238,6 +238,24 @@ mod tests {
     }
 
     #[test]
+    fn units_are_told_apart() {
+        let instant = Instant::from_nanos(3_004_005_006);
+        assert_eq!(instant.nanos(), 3_004_005_006);
+        assert_eq!((instant.micros(), instant.millis()), (3_004_005, 3_004));
+        // The unit, the product and the number here are rounded, each by half of EPSILON at most.
+        let near = |s: f64| (s - 3.004_005_006).abs() <= 1.5 * f64::EPSILON * s;
+        assert!(near(instant.seconds()));
+        let duration = Duration::from_nanos(3_004_005_006);
+        assert_eq!(
+            (duration.nanos(), duration.micros()),
+            (3_004_005_006, 3_004_005)
+        );
+        assert!(near(duration.seconds()));
+        assert_eq!(Duration::from_secs(3), Duration::from_millis(3_000));
+        assert_eq!(Instant::from_micros(7), Instant::from_nanos(7_000));
+    }
+
+    #[test]
     fn sums_saturate_and_differences_are_not_negative() {
         let (early, late) = (Instant::from_micros(1), Instant::from_micros(3));
         assert_eq!(late.since(early), Duration::from_micros(2));

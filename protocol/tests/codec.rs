@@ -155,6 +155,30 @@ fn the_range_of_every_sample_is_that_of_the_table() {
     }
 }
 
+/// Not one float but all four of a sample, next to the limits of the table: no two wrongs make a right.
+#[test]
+fn a_sample_of_nothing_but_bad_floats_is_refused() {
+    for info in [&table::FEEDBACK, &table::COMMAND] {
+        let signals = info.signals.iter();
+        let (signal, max) = signals
+            .filter_map(|signal| match signal.kind {
+                Kind::F32 { max, .. } => Some((signal, max)),
+                _ => None,
+            })
+            .next()
+            .unwrap();
+        for value in [max.next_up(), -max.next_up(), f32::INFINITY, f32::NAN] {
+            let mut body = vec![0; info.body_len()];
+            body[signal.offset..][..16].copy_from_slice(&value.to_le_bytes().repeat(4));
+            let refused = codec::decode(&protected(info, &body));
+            assert!(
+                matches!(refused, Err(DecodeError::Value(_))),
+                "{value}: {refused:?}"
+            );
+        }
+    }
+}
+
 /// Every flip of one and two bits in the cyclic frames, and of three in the shortest.
 #[test]
 fn flips_are_found() {
@@ -191,10 +215,14 @@ fn identifiers_that_are_not_ours_are_unknown() {
         let known = TABLE.iter().any(|info| info.id == id);
         let found = codec::decode(&frame_of(id, false, &[0; 3]));
         assert_eq!(found == Err(DecodeError::UnknownId), !known, "{id:#x}");
+        let identified =
+            |frame: &CanFrame| TABLE.iter().filter(|info| info.identifies(frame)).count();
+        assert_eq!(identified(&frame_of(id, false, &[])), usize::from(known));
         // The 29-bit twins: same number, and same first 11 bits.
         for raw in [u32::from(id), u32::from(id) << 18] {
             let twin = CanFrame::classical(ExtendedId::new(raw).unwrap(), &[0; 2]).unwrap();
             assert_eq!(codec::decode(&twin), Err(DecodeError::UnknownId));
+            assert_eq!(identified(&twin), 0);
         }
     }
 }
@@ -244,6 +272,14 @@ fn format_and_length_must_be_those_of_the_message() {
             }
         }
     }
+}
+
+/// Major, minor and patch of the version, a byte each.
+#[test]
+fn the_build_of_the_handshake_is_the_version() {
+    let parts = env!("CARGO_PKG_VERSION").split('.');
+    let build = parts.fold(0, |build, part| build * 256 + part.parse::<u32>().unwrap());
+    assert_eq!(table::HELLO.build, build);
 }
 
 #[test]

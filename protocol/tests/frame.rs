@@ -97,6 +97,7 @@ proptest! {
         let frame = CanFrame::fd(id, &data, brs).unwrap().with_esi(esi);
         prop_assert_eq!(frame.id(), id);
         prop_assert_eq!(frame.kind(), FrameKind::Fd { brs, esi });
+        prop_assert_eq!((frame.brs(), frame.esi()), (brs, esi));
         prop_assert_eq!(&frame.data()[..data.len()], &data[..]);
         prop_assert!(frame.data()[data.len()..].iter().all(|&byte| byte == 0));
         prop_assert_eq!(frame.to_embedded::<Driver>(), None);
@@ -107,6 +108,7 @@ proptest! {
         let frame = if remote { CanFrame::remote(id, data.len()) } else { CanFrame::classical(id, &data) }.unwrap();
         prop_assert_eq!(usize::from(frame.dlc()), data.len());
         prop_assert_eq!(frame.with_esi(true), frame);
+        prop_assert!(!frame.brs() && !frame.esi());
         let driver: Driver = frame.to_embedded().unwrap();
         prop_assert_eq!(CanFrame::from_embedded(&driver), Some(frame));
     }

@@ -103,6 +103,12 @@ const BANDWIDTH: u16 = ControllerParameter::Bandwidth.rule().number;
 const FAULT_SAMPLES: u16 = ControllerParameter::FaultSamples.rule().number;
 
 #[test]
+fn when_a_parameter_may_be_set_has_a_text() {
+    let texts = [Settable::Never, Settable::AtRest, Settable::Always].map(Settable::name);
+    assert_eq!(texts, ["never", "at rest", "always"]);
+}
+
+#[test]
 fn names_are_unique_and_numbers_are_found() {
     let mut names = HashSet::new();
     for parameter in parameters::all() {

@@ -119,10 +119,16 @@ fn python_can_opens() {
     );
 }
 
+/// Registers of the CAN232's controller, and a rate in the dialect of others.
+#[test]
+fn bit_timing_is_read_in_any_dialect() {
+    assert_eq!(read(b"s031C\rs8\r"), [Ok(Line::Timing); 2]);
+}
+
 #[test]
 fn errors_say_what_is_wrong_and_the_next_line_is_read() {
     use SlcanError::{IdOutOfRange, NotHex, OutOfRange, TooLong, UnknownCommand, WrongLength};
-    let cases: [(&[u8], SlcanError); 25] = [
+    let cases: [(&[u8], SlcanError); 26] = [
         (b"x", UnknownCommand(b'x')),
         (b"Z2", OutOfRange(2)),
         (b"m1234567", WrongLength),
@@ -145,6 +151,7 @@ fn errors_say_what_is_wrong_and_the_next_line_is_read() {
         (b"S9", OutOfRange(9)),
         (b"t1g30", NotHex { at: 2 }),
         (b"t1231-0", NotHex { at: 5 }),
+        (b"t12310-", NotHex { at: 6 }),
         (b"O1", WrongLength),
         (b"V101", WrongLength),
         (&[b'D'; MAX_LINE + 8], TooLong),

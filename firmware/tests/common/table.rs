@@ -40,6 +40,6 @@ pub(crate) fn compare(name: &str, text: &str) {
     }
     panic!(
         "docs/safety.md differs from the {name} of the code:\n{report}\
-         UPDATE_DOCS=1 cargo test -p firmware --test states --test faults writes it anew"
+         UPDATE_DOCS=1 cargo test -p firmware --test states --test faults --test node writes it anew"
     );
 }

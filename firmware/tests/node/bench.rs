@@ -22,7 +22,7 @@ pub(crate) const PERIOD: Period = Period::of_rate(1000.0);
 /// Longer than any watchdog of the drives.
 pub(crate) const SILENCE: Duration = Duration::from_nanos(PEER_TIMEOUT.nanos() + 1_000);
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Wire {
     pub to_node: VecDeque<CanFrame>,
     pub from_node: Vec<CanFrame>,
@@ -40,6 +40,7 @@ impl Transmit for Wire {
 }
 
 /// A node and an arm that stays still whatever the command, unless it `follows`: then it is at the node's reference.
+#[derive(Clone)]
 pub(crate) struct Bench {
     pub node: Node,
     pub wire: Wire,
@@ -242,7 +243,7 @@ impl Bench {
     }
 
     pub(crate) fn motion(&mut self, request: MotionRequest) -> CanFrame {
-        self.sequence += 1;
+        self.sequence = self.sequence.wrapping_add(1);
         let motion = Motion {
             sequence: self.sequence,
             request,

@@ -11,8 +11,13 @@
 mod bench;
 mod faults;
 mod gains;
+mod pair;
 mod parameters;
 mod reports;
 mod requests;
 mod stops;
 mod switching;
+mod wire;
+
+#[path = "../common/table.rs"]
+mod table;

@@ -1,9 +1,7 @@
-//! What the node sends unprompted, how much it does in one call, and what it ignores.
+//! What the node sends unprompted, and how much it does in one call.
 
 use firmware::control::phase::{Phase, Probe};
-use proptest::prelude::*;
 use protocol::codec::encode;
-use protocol::frame::{CanFrame, StandardId};
 use protocol::messages::{
     Message, Mode, MotionRequest, Nmt, NmtCommand, Node as Name, Posture, ResetReason, State,
 };
@@ -76,34 +74,6 @@ fn a_node_asked_to_reset_says_so_and_nothing_more() {
         let sent = bench.poll();
         assert_eq!(bench.node.reset_asked(), asked, "{command} {node}");
         assert_eq!(sent.is_empty(), asked, "{command} {node}: {sent:?}");
-    }
-}
-
-fn junk() -> impl Strategy<Value = CanFrame> {
-    let bytes = proptest::collection::vec(any::<u8>(), 0..64);
-    (0u16..0x800, bytes, any::<bool>()).prop_filter_map("no frame", |(id, bytes, fd)| {
-        let id = StandardId::new(id)?;
-        if fd {
-            CanFrame::fd(id, &bytes, true)
-        } else {
-            CanFrame::classical(id, &bytes)
-        }
-    })
-}
-
-proptest! {
-    /// Foreign frames change nothing: same state, same torques, to the bit.
-    #[test]
-    fn junk_changes_nothing(frames in proptest::collection::vec(junk(), 1..30)) {
-        // Some random frames are valid e-stops or NMT commands, which carry no protection, and
-        // three bad feedback frames in a row stop the arm: tested elsewhere.
-        prop_assume!(frames.iter().all(|f| f.raw_id() > 0x001 && f.raw_id() != 0x1C0));
-        let (mut clean, mut dirty) = (Bench::enabled(), Bench::enabled());
-        for frame in frames {
-            dirty.wire.to_node.push_back(frame);
-            prop_assert_eq!(clean.command(), dirty.command());
-            prop_assert_eq!(clean.mode(), dirty.mode());
-        }
     }
 }
 

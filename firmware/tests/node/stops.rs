@@ -147,13 +147,16 @@ fn a_stop_that_is_followed_ends_at_rest() {
     let mut bench = Bench::moving();
     bench.wire.to_node.push_back(estop());
     let mut closing = 0;
-    while bench.command().control == ESTOP_STOPPING {}
+    (0..1000)
+        .find(|_| bench.command().control != ESTOP_STOPPING)
+        .expect("the arm comes to rest");
     let here = bench.node.controller().reference().q;
     while bench.command().control == ESTOP_BRAKE {
         assert_eq!(bench.node.controller().reference().q, here);
         closing += 1;
+        assert!(closing <= 61, "the brake has its time");
     }
-    assert!((30..=61).contains(&closing), "{closing} samples");
+    assert!(closing >= 30, "{closing} samples");
     assert_eq!(bench.command().control, ControlWord::ESTOP);
 }
 

@@ -61,7 +61,12 @@ impl LockStep {
                 }
                 // Another node has sent a frame, such as an emergency stop or a parameter request, and only the
                 // controller knows when it received it.
-                None => self.follows = false,
+                None => {
+                    self.follows = false;
+                    // Of what the controller has yet to send, only the command is sure to come.
+                    let due = self.twin.due();
+                    due.retain(|frame| table::COMMAND.identifies(frame));
+                }
             }
         }
         Ok(())

@@ -22,11 +22,13 @@ const RETRY: Duration = Duration::from_millis(200);
 const MEET_LIMIT: Duration = Duration::from_secs(60);
 
 /// Node that sends this frame, if only one may. A parameter request may come from another tool
-/// (`plant-sim parameters`) and does not indicate a second plant.
+/// (`plant-sim parameters`) and does not indicate a second plant, nor does a bad frame. What the controller sends is
+/// compared, right or wrong.
 pub(crate) fn sender(frame: &CanFrame) -> Option<Name> {
     table::of_frame(frame)
         .filter(|info| info.id != table::CONTROLLER_PARAMETER_REQUEST.id)
         .and_then(|info| info.sender)
+        .filter(|name| *name == Name::Controller || codec::decode(frame).is_ok())
 }
 
 /// Opens the bus, makes sure that no other plant is on it, and waits for a controller, which is reset.

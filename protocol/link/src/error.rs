@@ -45,6 +45,12 @@ pub enum LinkError {
 }
 
 impl LinkError {
+    /// Whether this may pass by itself: an interface that is down or missing may come back.
+    #[must_use]
+    pub const fn may_pass(&self) -> bool {
+        matches!(self, Self::Down { .. } | Self::NoInterface { .. })
+    }
+
     pub(crate) fn io(what: impl Into<String>, source: impl Into<io::Error>) -> Self {
         Self::Io {
             what: what.into(),

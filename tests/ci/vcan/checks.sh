@@ -2,16 +2,9 @@
 # checks.sh BIN: the checks of 10-vcan.sh, on a machine with vcan0.
 source "$(dirname "$0")/../lib.bash"
 bin=$1
+source tests/ci/vcan/processes.bash
 cd "$work"
 
-passed() { echo "ok: $*"; }
-said=0
-mark() { said=$(wc -l <controller.err); } # later lines of the controller are new
-has_said() { tail -n +$((said + 1)) controller.err | grep -q "$1"; }
-await_controller() { eventually "controller: \"$1\"" has_said "$1"; }
-sockets() { [ "$(grep -c vcan0 /proc/net/can/rcvlist_all)" -ge "$1" ]; } # programs that receive from vcan0
-controller() { "$bin/controller" --bus socketcan:vcan0 "$@" 2>controller.err & controller=$!; }
-plant() { timeout 60 "$bin/plant-sim" run --scenario gate --bus socketcan:vcan0 --controller external "$@"; }
 # Identifiers and data of a candump log, sorted by identifier: frames of one node with one identifier stay in order,
 # those of different nodes may be logged in either order. Flag 4 (FDF) repeats the meaning of ##.
 frames() { awk '{print $3}' "$1" | sed -E 's/##[45]/##1/' | grep -v '^000#' | sort -s -t'#' -k1,1; }

@@ -104,7 +104,7 @@ fn run(args: &Args) -> Result<(), Failure> {
     } else {
         Clock::lock_step(period)
     };
-    Shell::new(link, args.bus.to_string(), Config::new(arm, period), clock)
+    Shell::new(link, args.bus.clone(), Config::new(arm, period), clock)
         .run(&stop)
         .map_err(Failure::failed)
 }

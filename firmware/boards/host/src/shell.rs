@@ -1,11 +1,13 @@
 //! The loop around the node: waits for frames, passes the time, reports changes.
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
 use std::time::{Duration, Instant, SystemTime};
 
 use firmware::control::controller::Config;
 use firmware::node::Node;
-use link::{Link, LinkError, Stamped};
+use link::{Link, LinkAddress, LinkError, Stamped};
+use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{Mode, Node as Name, ResetReason};
 use protocol::table;
@@ -50,7 +52,9 @@ struct Counts {
 
 pub(crate) struct Shell {
     link: Link,
-    bus: String,
+    bus: LinkAddress,
+    /// Whether the interface of the bus has gone and is waited for.
+    away: bool,
     config: Config,
     node: Node,
     clock: Clock,
@@ -63,13 +67,14 @@ pub(crate) struct Shell {
 }
 
 impl Shell {
-    pub(crate) fn new(link: Link, bus: String, config: Config, clock: Clock) -> Self {
+    pub(crate) fn new(link: Link, bus: LinkAddress, config: Config, clock: Clock) -> Self {
         let deadline =
             matches!(clock, Clock::RealTime { .. }).then(|| config.period.duration().into());
         Self {
             node: Node::new(config, ResetReason::PowerOn),
             link,
             bus,
+            away: false,
             config,
             clock,
             deadline,
@@ -85,10 +90,9 @@ impl Shell {
         self.poll(None);
         say!("controller: waiting for the drives on {}", self.bus);
         while !stop.load(Ordering::Relaxed) {
-            if self.link.wait(TICK)? {
-                while let Some(stamped) = self.link.take() {
-                    self.take(&stamped)?;
-                }
+            self.wait()?;
+            while let Some(stamped) = self.link.take() {
+                self.take(&stamped)?;
             }
             if self.clock.idle() {
                 self.poll(None);
@@ -117,6 +121,29 @@ impl Shell {
             self.link.wait(left.min(TICK))?;
             while let Some(stamped) = self.link.take() {
                 self.refuse_duplicate(&stamped.frame)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for a frame. An interface that has gone may come back: until then the node goes on without frames, and its
+    /// watchdogs take the torque away.
+    fn wait(&mut self) -> Result<(), ShellError> {
+        if self.away {
+            thread::sleep(TICK);
+            if let Ok(link) = Link::open(&self.bus) {
+                (self.link, self.away) = (link, false);
+                say!("controller: {} is back", self.bus);
+            }
+            return Ok(());
+        }
+        match self.link.wait(TICK) {
+            Err(error) if error.may_pass() => {
+                say!("controller: {error}; waiting for it");
+                self.away = true;
+            }
+            result => {
+                result?;
             }
         }
         Ok(())
@@ -183,11 +210,14 @@ impl Shell {
 
     fn refuse_duplicate(&self, frame: &CanFrame) -> Result<(), ShellError> {
         match table::of_frame(frame) {
-            Some(info) if info.sender == Some(Name::Controller) => Err(ShellError::Duplicate {
-                bus: self.bus.clone(),
-                name: info.name,
-                id: info.id,
-            }),
+            // A frame that only looks like one of a controller is bad input, like any other.
+            Some(info) if info.sender == Some(Name::Controller) && codec::decode(frame).is_ok() => {
+                Err(ShellError::Duplicate {
+                    bus: self.bus.to_string(),
+                    name: info.name,
+                    id: info.id,
+                })
+            }
             _ => Ok(()),
         }
     }

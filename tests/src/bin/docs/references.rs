@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::Problem;
 use crate::markdown::Document;
 
-/// Prefixes of the paths in backquotes that are checked.
+/// Prefixes of the paths in backquotes that are checked. A name after one of Rust is that of a function in it.
 const FOLDERS: [&str; 5] = ["docs/", "firmware/", "plant-sim/", "protocol/", "tests/"];
 
 /// Links of the document at `path`, and paths from `root` in backquotes, that lead nowhere.
@@ -20,12 +20,26 @@ pub(crate) fn check(document: &Document, path: &Path, root: &Path) -> Vec<Proble
         .code_spans()
         .into_iter()
         .filter_map(|(line, span)| {
-            let word = span.split_whitespace().next()?;
-            let is_path = FOLDERS.iter().any(|folder| word.starts_with(folder));
-            (is_path && !exists(root, word))
-                .then(|| Problem::new(line, format!("'{word}' is not a file or folder")))
+            let mut words = span.split_whitespace();
+            let word = words.next()?;
+            if !FOLDERS.iter().any(|folder| word.starts_with(folder)) {
+                return None;
+            }
+            if !exists(root, word) {
+                return Some(Problem::new(
+                    line,
+                    format!("'{word}' is not a file or folder"),
+                ));
+            }
+            let name = words.next().filter(|_| word.ends_with(".rs"))?;
+            let has = has_function(root, word, name);
+            (!has).then(|| Problem::new(line, format!("{word} has no function '{name}'")))
         });
     links.chain(paths).collect()
+}
+
+fn has_function(root: &Path, path: &str, name: &str) -> bool {
+    fs::read_to_string(root.join(path)).is_ok_and(|text| text.contains(&format!("fn {name}(")))
 }
 
 fn link_leads_somewhere(target: &str, document: &Document, folder: &Path) -> bool {
@@ -67,11 +81,12 @@ mod tests {
         let root = crate::root();
         let text = "# Here\n[a](README.md) [b](#here) [c](https://x.y) [d](docs/motion.md#the-control-laws)\n\
                     [e](none.md) [f](#there) [g](docs/motion.md#none)\n\
-                    `tests/run rust` `tests/ci/1*.sh` `firmware/src`\n`tests/none` `tests/ci/none*.sh`\n";
+                    `tests/run rust` `tests/ci/1*.sh` `firmware/src`\n`tests/none` `tests/ci/none*.sh`\n\
+                    `tests/tests/walls.rs root` `tests/tests/walls.rs none`\n";
         let lines: Vec<_> = check(&Document::new(text), &root.join("X.md"), &root)
             .into_iter()
             .map(|problem| problem.line)
             .collect();
-        assert_eq!(lines, [3, 3, 3, 5, 5]);
+        assert_eq!(lines, [3, 3, 3, 5, 5, 6]);
     }
 }
