@@ -82,11 +82,13 @@ impl Clock {
             return;
         }
         let before = self.time_scale;
-        self.time_scale = clamp(before + self.slope * period, 0.0, 1.0);
-        // There, or past it.
-        if (before - self.pace) * (self.time_scale - self.pace) <= 0.0 && self.slope != 0.0 {
-            self.time_scale = self.pace;
-            self.slope = 0.0;
+        if self.slope != 0.0 {
+            self.time_scale = clamp(before + self.slope * period, 0.0, 1.0);
+            // There, or past it.
+            if (before - self.pace) * (self.time_scale - self.pace) <= 0.0 {
+                self.time_scale = self.pace;
+                self.slope = 0.0;
+            }
         }
         self.fraction += 0.5 * (before + self.time_scale);
         if self.fraction >= 1.0 {

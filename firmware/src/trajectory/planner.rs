@@ -89,14 +89,13 @@ enum Stage {
     /// Both strokes over the travel.
     Overlay,
     Verify {
-        /// Time of the sample, s.
-        t: f32,
         time_scale: f32,
         /// The sample before.
         before: Option<Before>,
     },
     /// Its motion is known.
     Load {
+        /// Time of the sample, s.
         t: f32,
         time_scale: f32,
         before: Option<Before>,
@@ -111,7 +110,6 @@ enum Stage {
 impl Stage {
     /// The last pass, from its beginning.
     const VERIFY: Self = Self::Verify {
-        t: 0.0,
         time_scale: 1.0,
         before: None,
     };
@@ -238,11 +236,7 @@ impl Planner {
                 point,
                 wanted,
             } => self.balance(budget, round, point, wanted),
-            Stage::Verify {
-                t,
-                time_scale,
-                before,
-            } => self.verify(budget, t, time_scale, before),
+            Stage::Verify { time_scale, before } => self.verify(budget, time_scale, before),
             Stage::Load {
                 t,
                 time_scale,

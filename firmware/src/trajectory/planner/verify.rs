@@ -48,10 +48,10 @@ impl Planner {
     pub(super) fn verify(
         &mut self,
         budget: &TorqueBudget<'_>,
-        t: f32,
         time_scale: f32,
         before: Option<Before>,
     ) -> Result<(), Refusal> {
+        let t = before.map_or(0.0, |before| self.next_sample(before.t));
         let reference = self.draft.at(budget.arm, t).map_err(from_path)?;
         let (share, _) = shares(&self.draft);
         let scale = budget.speed_scale(&reference.qd, share);
@@ -87,7 +87,6 @@ impl Planner {
         }
         self.stage = if t < self.draft.span {
             Stage::Verify {
-                t: self.next_sample(t),
                 time_scale,
                 before: Some(Before {
                     t,
