@@ -72,7 +72,7 @@ fn a_reading_is_shown_with_all_that_is_known_of_it() {
             "1",
             "to",
             "250",
-            "150",
+            "170",
             "at",
             "rest"
         ]
@@ -80,7 +80,7 @@ fn a_reading_is_shown_with_all_that_is_known_of_it() {
     assert_eq!(lines[2][..2], ["0x0ffe", "120"]);
     let rows: serde_json::Value = serde_json::from_str(&json(&readings, 1e-3)).unwrap();
     assert_eq!(rows[0]["name"], "bandwidth");
-    assert_eq!(rows[0]["default"], 150.0);
+    assert_eq!(rows[0]["default"], 170.0);
     assert_eq!(rows[0]["settable"], "at rest");
     assert_eq!(rows[1]["settable"], serde_json::Value::Null);
 }

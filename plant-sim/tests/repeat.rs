@@ -103,8 +103,8 @@ fn what_the_command_line_changed_is_repeated() {
     assert_eq!(summary["payload"]["mass"], 3.3);
     assert_eq!(summary["payload"]["com_flange_frame"][2], 0.05);
     assert_eq!(summary["mismatch"]["friction"], 1.2);
-    // A corner of 0.15 rad per sample at 500 Hz.
-    assert_eq!(summary["gains"]["bandwidth"], 75.0);
+    // A corner of 0.17 rad per sample at 500 Hz.
+    assert_eq!(summary["gains"]["bandwidth"], 85.0);
     assert_eq!(summary["state"], "ready");
     assert_eq!(summary["fault"], Value::Null);
     assert_eq!(summary["completed"], true);

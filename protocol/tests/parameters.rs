@@ -176,7 +176,7 @@ fn every_reply_occurs() {
         ask(&mut bench, ParameterRequest::Get { index: BANDWIDTH }),
         ParameterReply::Value {
             index: BANDWIDTH,
-            value: 150.0,
+            value: 170.0,
             lower: 1.0,
             upper: 250.0,
         }

@@ -37,7 +37,7 @@ const TWINS: [(&str, &[&str], &[&str]); 19] = [
     ("screw", &["law=pid"], &["thread"]),
     (
         "payload-change",
-        &["mismatch.payload=1.2", "law=computed-torque:none"],
+        &["mismatch.payload=1.4", "law=computed-torque:none"],
         &["tracking"],
     ),
     ("far-reach", &["law=pid"], &["tracking"]),

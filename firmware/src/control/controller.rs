@@ -33,7 +33,7 @@ use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::clamp;
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
-use crate::trajectory::{Reference, Setpoint};
+use crate::trajectory::{Rates, Reference, Setpoint};
 use requests::Answer;
 
 /// Planning steps per millisecond of the sampling period.
@@ -192,6 +192,11 @@ impl Controller {
     /// Reference of the last sample.
     pub fn reference(&self) -> &Reference {
         &self.setpoint.reference
+    }
+
+    /// How the arm is meant to move when the command of the last sample acts.
+    pub fn ahead(&self) -> &Rates {
+        &self.setpoint.ahead
     }
 
     /// Reference minus measured position of the last sample.

@@ -15,6 +15,7 @@ use firmware::control::states::Event;
 use firmware::mechanics::arm::ArmModel;
 use firmware::mechanics::body::Body;
 use firmware::mechanics::kinematics::Trig;
+use firmware::trajectory::Rates;
 use nalgebra::Vector4;
 use protocol::messages::{Cause, ControlWord, DriveStatus, Mode, MotionRequest, Outcome};
 use protocol::time::Duration;
@@ -280,10 +281,10 @@ impl Stage {
 
     /// One sample, at which the arm is where the reference of the last one leads.
     fn sample(&mut self) -> Result<(), OperatorError> {
-        let reference = self.controller.reference();
-        let t = self.period;
-        let ahead = reference.qd + reference.qdd * (t / 2.0);
-        let q = reference.q + ahead * t;
+        // The command acts later than in the middle of the sample, whose speed is the mean.
+        let Rates { qd, qdd } = *self.controller.ahead();
+        let mean = qd - qdd * self.controller.setup().command_delay;
+        let q = self.controller.reference().q + mean * self.period;
         self.sample_at(q);
         let fault = self.controller.fault();
         if fault.cause != Cause::None {

@@ -15,19 +15,17 @@ use crate::trajectory::{Reference, Trajectory};
 /// their own.
 const JOINT_STEPS: u8 = 16;
 pub(super) const LINE_STEPS: u8 = 24;
-/// Share of the limits of speed, acceleration and jerk that the samples of a line may use: there is more between them.
+/// Share of the limits of speed, acceleration, jerk and torque rate that the samples of a line may use: there is more between them, and
+/// of rates they show the mean over a step.
 const LINE_SHARE: f32 = 0.9;
-/// The same for torque rates, of which the samples show the mean over a step.
-const LINE_RATE: f32 = 0.94;
-
 /// Further share of those of acceleration and jerk, of a robot that has them.
 const CAP_SHARE: f32 = 0.95;
 
-/// Shares of the limits for the samples of this move: of speed, acceleration and jerk; and of the torques' rates.
-fn shares(draft: &Trajectory) -> (f32, f32) {
+/// Share of the limits for the samples of this move.
+fn share(draft: &Trajectory) -> f32 {
     match draft.path {
-        Path::Joint { .. } => (1.0, 1.0),
-        Path::Line { .. } => (LINE_SHARE, LINE_RATE),
+        Path::Joint { .. } => 1.0,
+        Path::Line { .. } => LINE_SHARE,
     }
 }
 
@@ -53,8 +51,7 @@ impl Planner {
     ) -> Result<(), Refusal> {
         let t = before.map_or(0.0, |before| self.next_sample(before.t));
         let reference = self.draft.at(budget.arm, t).map_err(from_path)?;
-        let (share, _) = shares(&self.draft);
-        let scale = budget.speed_scale(&reference.qd, share);
+        let scale = budget.speed_scale(&reference.qd, share(&self.draft));
         self.stage = Stage::Load {
             t,
             time_scale: least(time_scale, scale),
@@ -77,8 +74,8 @@ impl Planner {
         if let Some(before) = before {
             let time = t - before.t;
             let change = torque - before.torque;
-            let (share, rate) = shares(&self.draft);
-            time_scale = least(time_scale, budget.rate_scale(&change, rate * time));
+            let share = share(&self.draft);
+            time_scale = least(time_scale, budget.rate_scale(&change, share * time));
             if budget.arm.limits.caps_acceleration() {
                 let jerk = (reference.qdd - before.qdd) / time;
                 let scale = budget.cap_scale(&reference.qdd, &jerk, CAP_SHARE * share);
