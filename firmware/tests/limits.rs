@@ -115,11 +115,19 @@ fn a_limit_is_kept_where_it_is_reached() {
     let reach = 0.5 * (IRB_930.limits.upper - IRB_930.limits.lower) + limits.range_margin;
     let mut monitor = monitor();
     for _ in 0..10 {
-        let (error, q) = (limits.following_error, middle() + reach);
         // The sum may be rounded to one beyond the limit; the difference is what counts.
-        if (q - middle()).iter().zip(reach.iter()).all(|(a, b)| a <= b) {
-            assert_eq!(monitor.check(&moving, &q, &ZERO, &error, &error), None);
-        }
+        let furthest = (middle() + reach).zip_zip_map(&middle(), &reach, |sum, middle, reach| {
+            if sum - middle <= reach {
+                sum
+            } else {
+                sum.next_down()
+            }
+        });
+        let error = limits.following_error;
+        assert_eq!(
+            monitor.check(&moving, &furthest, &ZERO, &error, &error),
+            None
+        );
         assert_eq!(
             monitor.check(&moving, &middle(), &speed, &error, &error),
             None

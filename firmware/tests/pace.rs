@@ -25,6 +25,8 @@ use proptest::prelude::*;
 use protocol::messages::Posture;
 
 const PERIOD: f32 = 1e-3;
+/// More than the torques can make of the jerks of the joints, rad/s^3 and m/s^3.
+const JERK: [f32; 4] = [4e4, 4e4, 1e4, 2e5];
 
 /// One move in a queue, sample by sample.
 struct Run<'a> {
@@ -248,4 +250,117 @@ fn a_held_arm_stands_until_it_may_go_on() {
         .unwrap();
     assert!(samples > 100, "{samples}");
     assert!((run.setpoint.reference.q - to).amax() < 1e-5);
+}
+
+/// Two moves, the second one sometimes of no length, with gaps in the feedback, changes of the pace and a stop at any time: position and
+/// speed go on from sample to sample, and each move that has ended is told.
+#[derive(Debug, Clone)]
+struct Ride {
+    second: Vector4<f32>,
+    steps: Vec<u32>,
+    changes: Vec<(usize, f32)>,
+    stop: Option<usize>,
+}
+
+fn rides() -> impl Strategy<Value = Ride> {
+    let second = prop_oneof![joints().boxed(), Just(Vector4::repeat(f32::NAN)).boxed()];
+    let pace = prop_oneof![Just(0.3f32), Just(1.0), 0.1f32..1.0];
+    (
+        second,
+        prop::collection::vec(prop_oneof![4 => Just(1u32), 1 => 1u32..=5], 64),
+        prop::collection::vec((0usize..400, pace), 0..3),
+        prop::option::weighted(0.3, 0usize..400),
+    )
+        .prop_map(|(second, steps, changes, stop)| Ride {
+            second,
+            steps,
+            changes,
+            stop,
+        })
+}
+
+fn ride(from: &Vector4<f32>, to: &Vector4<f32>, ride: &Ride) -> Result<(), TestCaseError> {
+    let body = Body::new(&IRB_930, &two_kg());
+    let budget = TorqueBudget {
+        arm: &IRB_930,
+        body: &body,
+    };
+    let Some(mut run) = Run::new(budget, from, Target::Joints(*to), 1.0) else {
+        return Ok(());
+    };
+    // Not a number stands for where the first move ends, a millionth of a radian off.
+    let second = ride.second.zip_map(
+        to,
+        |second, to| if second.is_nan() { to + 1e-6 } else { second },
+    );
+    let request = Request {
+        sequence: 2,
+        target: Target::Joints(second),
+        speed: 1.0,
+    };
+    run.queue.push(request).unwrap();
+    while run.queue.has_to_plan() {
+        if let Some((_, answer)) = run.queue.plan(&run.budget) {
+            prop_assert!(answer.is_ok());
+        }
+    }
+    let ends = [*to, second];
+    let mut before = Reference::rest(*from);
+    for sample in 0..20_000 {
+        for (_, pace) in ride.changes.iter().filter(|(when, _)| *when == sample) {
+            run.queue.set_pace(*pace);
+        }
+        let stopping = ride.stop.is_some_and(|stop| sample >= stop);
+        let steps = ride.steps[sample % ride.steps.len()];
+        let stride = Stride {
+            steps,
+            period: PERIOD,
+            lead: 0.75 * PERIOD,
+            stopping,
+        };
+        let told = run.queue.completed();
+        let progress = run.queue.advance(&run.budget, &stride, &mut run.setpoint);
+        let here = run.setpoint.reference;
+        // The speed is at most that of the faster end, and what torques can add in between.
+        let time = steps as f32 * PERIOD;
+        for axis in 0..4 {
+            let gain =
+                here.qdd[axis].abs().max(before.qdd[axis].abs()).max(1.0) + JERK[axis] * time;
+            let speed = here.qd[axis].abs().max(before.qd[axis].abs()) + gain * time;
+            let moved = (here.q[axis] - before.q[axis]).abs();
+            prop_assert!(
+                moved <= speed * time + 1e-6,
+                "{axis} jumps by {moved} at {sample}"
+            );
+        }
+        if run.queue.completed() != told {
+            let end = ends[usize::from(run.queue.completed()) - 1];
+            for axis in 0..4 {
+                let near = (here.q[axis] - end[axis]).abs();
+                prop_assert!(
+                    near < JERK[axis] * time * time * time + 1e-5,
+                    "{near} from the end at {sample}"
+                );
+            }
+        }
+        if progress == Progress::Arrived {
+            if !stopping {
+                prop_assert_eq!(run.queue.completed(), 2);
+                prop_assert!((here.q - second).amax() < 1e-5);
+            }
+            prop_assert_eq!(here.qd, Vector4::zeros());
+            return Ok(());
+        }
+        before = here;
+    }
+    Err(TestCaseError::fail("never arrived"))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    #[test]
+    fn one_move_goes_over_into_the_next(from in joints(), to in joints(), course in rides()) {
+        ride(&from, &to, &course)?;
+    }
 }

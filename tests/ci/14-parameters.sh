@@ -16,7 +16,7 @@ holds() { # holds NAME VALUE: whether the node has this value now
 "$controller" --bus "slcan:listen:127.0.0.1:$port" 2>controller.err & controller_id=$!
 await controller.err "waiting for the drives"
 parameters >alone.txt
-grep -q '^bandwidth  *150 rad/s  *1 to 250  *150  at rest$' alone.txt
+grep -q '^bandwidth  *170 rad/s  *1 to 250  *170  at rest$' alone.txt
 grep -q "the drives on .* do not answer" parameters.err || fail "silent drives are not reported"
 parameters --set bandwidth=120 >set.txt
 holds bandwidth 120.0 || fail "a value set is not kept"
@@ -32,7 +32,7 @@ echo "ok: a controller alone lists and sets its own parameters, and reports allo
 timeout 120 "$plant_sim" run --cycles 200 --bus "slcan:tcp:127.0.0.1:$port" --controller external --out beside --json \
     >beside.json 2>run.err & run=$!
 await run.err "cycle [0-9]* of"
-holds bandwidth 150.0 || fail "a run does not reset its controller"
+holds bandwidth 170.0 || fail "a run does not reset its controller"
 parameters --set following-error-elbow=0.04 --set hold-samples=8 >set.txt
 holds following-error-elbow 0.04 || fail "a limit of the controller is not kept"
 holds hold-samples 8.0 || fail "a value of the drives is not kept"

@@ -128,6 +128,14 @@ pub fn cbrt(x: f32) -> f32 {
     if x < 0.0 { -root } else { root }
 }
 
+/// The fourth root of a positive number, or up to 0.6 % more: a quarter of the exponent is within 6 % of it, and a Newton step from
+/// either side leads above it.
+#[must_use]
+pub fn fourth_root_or_more(x: f32) -> f32 {
+    let near = f32::from_bits(x.to_bits() / 4 + 799_014_912);
+    0.75 * near + 0.25 * x / (near * near * near)
+}
+
 /// Length of the vector (x, y). Error at most 2 u relative while the squares stay within the range of `f32`, as they
 /// do for anything measured in metres.
 #[must_use]

@@ -31,7 +31,8 @@ impl Clock {
         }
     }
 
-    /// A few samples, or part of one, past the beginning of a trajectory.
+    /// Part of a sample, or after a gap a few, past the beginning of a trajectory, which has moved the arm by micrometres so far: any time
+    /// scale is still as good as another.
     pub fn begun(pace: f32, samples: f32) -> Self {
         Self {
             fraction: samples,

@@ -39,7 +39,7 @@ const SURVEY_POINTS: u8 = 24;
 const ROUNDS: u8 = 2;
 /// Samples of each half of the profile in one round.
 const BALANCE_POINTS: u8 = 3;
-/// Largest factor by which one round changes an acceleration.
+/// Largest factor by which one sample of a round changes an acceleration.
 const STEP: f32 = 1.6;
 /// Moves whose every axis travels less than this (rad or m) end where they begin.
 const NO_TRAVEL: f32 = 1e-6;

@@ -15,7 +15,7 @@
 
 mod half;
 
-use crate::mechanics::math::{cbrt, sqrt};
+use crate::mechanics::math::{cbrt, fourth_root_or_more, sqrt};
 use half::{Growth, Half, Peak};
 
 /// Value and first two time derivatives of the path coordinate.
@@ -78,13 +78,11 @@ pub struct SCurve {
 /// fall monotonically and the error squares. Four leave less than one part in 10^6 for any ratio of the bounds
 /// that a robot has (tested).
 const NEWTON_STEPS: usize = 4;
-/// Steps to the start: each takes a quarter off one that is far too high.
-const START_STEPS: usize = 6;
 
 impl SCurve {
     /// The fastest profile over `distance` (positive) within `bounds`.
     ///
-    /// Worst case: four Newton steps, without a root.
+    /// Worst case: a cube root, a square root, and four Newton steps.
     #[inline(never)]
     pub fn new(distance: f32, bounds: &Bounds) -> Self {
         let there = Growth::new(&bounds.accelerate, bounds.jerk);
@@ -232,13 +230,10 @@ impl SCurve {
 /// The m, at most that of the speed limit, at which both halves together make `distance`.
 #[inline(never)]
 fn meet(distance: f32, there: &Growth, back: &Growth, bounds: &Bounds) -> f32 {
-    // It is less than without a limit of acceleration, and less than if the ramps took no time: a fourth root, which steps from above
-    // come near enough to.
-    let mut m = cbrt(distance / (there.cubic + back.cubic));
-    let fourth = distance / (there.unramped() + back.unramped());
-    for _ in 0..START_STEPS {
-        m = m.min(0.75 * m + 0.25 * fourth / (m * m * m));
-    }
+    // It is less than without a limit of acceleration, and less than if the ramps took no time.
+    let unlimited = cbrt(distance / (there.cubic + back.cubic));
+    let unramped = fourth_root_or_more(distance / (there.unramped() + back.unramped()));
+    let mut m = unlimited.min(unramped);
     for _ in 0..NEWTON_STEPS {
         let (there, there_slope) = there.distance_and_slope(m);
         let (back, back_slope) = back.distance_and_slope(m);

@@ -223,12 +223,13 @@ impl MoveQueue {
         let mut t = self.clock.time(period);
         let mut duration = trajectory.duration();
         if t >= duration && !stopping && self.moves.len() > 1 {
-            // The next move begins where and when this one ends, within the sample.
+            // The next move begins where and when this one ends, within the sample. What the last sample looked ahead to was the end.
             t -= duration;
             self.completed = trajectory.sequence;
             self.moves.pop_front();
             self.clock = Clock::begun(self.pace(), t / period);
             let Some(next) = self.moves.front() else {
+                *setpoint = Setpoint::rest(here);
                 return Progress::Arrived;
             };
             trajectory = next;

@@ -53,8 +53,8 @@ struct Counts {
 pub(crate) struct Shell {
     link: Link,
     bus: LinkAddress,
-    /// Whether the interface of the bus has gone and is waited for.
-    away: bool,
+    /// Why the interface of the bus is waited for, where it has gone.
+    away: Option<String>,
     config: Config,
     node: Node,
     clock: Clock,
@@ -74,7 +74,7 @@ impl Shell {
             node: Node::new(config, ResetReason::PowerOn),
             link,
             bus,
-            away: false,
+            away: None,
             config,
             clock,
             deadline,
@@ -126,22 +126,31 @@ impl Shell {
         Ok(())
     }
 
+    /// Goes on without the interface, and says why, once for each reason: one that is back may have to be set up first.
+    fn go_without(&mut self, error: &LinkError) {
+        let reason = error.to_string();
+        if self.away.as_ref() != Some(&reason) {
+            say!("controller: {reason}; waiting for it");
+            self.away = Some(reason);
+        }
+    }
+
     /// Waits for a frame. An interface that has gone may come back: until then the node goes on without frames, and its
     /// watchdogs take the torque away.
     fn wait(&mut self) -> Result<(), ShellError> {
-        if self.away {
+        if self.away.is_some() {
             thread::sleep(TICK);
-            if let Ok(link) = Link::open(&self.bus) {
-                (self.link, self.away) = (link, false);
-                say!("controller: {} is back", self.bus);
+            match Link::open(&self.bus) {
+                Ok(link) => {
+                    (self.link, self.away) = (link, None);
+                    say!("controller: {} is back", self.bus);
+                }
+                Err(error) => self.go_without(&error),
             }
             return Ok(());
         }
         match self.link.wait(TICK) {
-            Err(error) if error.may_pass() => {
-                say!("controller: {error}; waiting for it");
-                self.away = true;
-            }
+            Err(error) if error.may_pass() => self.go_without(&error),
             result => {
                 result?;
             }

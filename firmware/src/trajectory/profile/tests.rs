@@ -43,8 +43,7 @@ proptest! {
             prop_assert!(sample.v >= -1e-5 && sample.v <= speed * 1.00001);
             prop_assert!(sample.a <= slow.max(fast) * 1.00001);
             prop_assert!(-sample.a <= late.max(last) * 1.00001);
-            // Accelerations of f32, each off by 4 u.
-            // And of f32 times.
+            // Accelerations of f32, each off by 4 u, at times of f32.
             let noise = 8.0 * f32::EPSILON * most + 2.0 * f32::EPSILON * duration * jerk;
             let allowed = from_rest.max(peak).max(to_rest) * (h as f32) * 1.0001;
             prop_assert!((sample.a - before).abs() <= allowed + noise);
@@ -80,6 +79,31 @@ proptest! {
         // 8 u of the time at its speed, and of the place.
         let slack = 8.0 * f32::EPSILON * (curve.duration() * here.v + distance);
         prop_assert!((here.s - s).abs() <= slack, "{} {s}", here.s);
+    }
+
+    /// Both halves and what is between them make up the distance: the motion does not jump in its middle, however little
+    /// acceleration there is for the jerk.
+    #[test]
+    fn the_halves_meet(
+        distance in 1e-5f32..6.0,
+        speed in 0.01f32..30.0,
+        accelerations in prop::array::uniform4(0.2f32..1.0),
+        most in -4.0f32..3.0,
+        jerks in prop::array::uniform3(0.4f32..1.0),
+        jerk in 1.0f32..6.0,
+    ) {
+        let [slow, fast, late, last] = accelerations.map(|share| share * 10f32.powf(most));
+        let [from_rest, peak, to_rest] = jerks.map(|share| share * 10f32.powf(jerk));
+        let bounds = Bounds {
+            speed,
+            jerk: peak,
+            accelerate: HalfBounds { jerk: from_rest, slow, fast },
+            brake: HalfBounds { jerk: to_rest, slow: last, fast: late },
+        };
+        let curve = SCurve::new(distance, &bounds);
+        let SCurve { accelerate, brake, cruise, peak, .. } = curve;
+        let sum = accelerate.distance + brake.distance + cruise * peak.speed;
+        prop_assert!((sum - distance).abs() <= 4e-6 * distance, "{sum} of {distance}");
     }
 
     /// Position is continuous across the segment borders: no jump larger than speed x step.

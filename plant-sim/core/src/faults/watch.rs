@@ -103,6 +103,7 @@ impl Watch {
             // One that goes on is left as it is.
             None if is_meant && self.fault.acts(now) => before,
             None if is_meant => (now, Instant::MAX),
+            None if before.0 == Instant::MAX => before,
             None => (before.0, before.1.min(now)),
         };
         self.fault.window.set(window);
