@@ -138,6 +138,21 @@ proptest! {
             prop_assert!(aside < 2e-6, "{aside} aside");
         }
     }
+
+    /// Up to 5 cm from the stretched arm and close to the base, where a joint moves most within a small part of the time.
+    #[test]
+    fn lines_anywhere_keep_every_limit(
+        r0 in 0.4f32..1.0, a0 in -2.0f32..2.0, r1 in 0.4f32..1.0, a1 in -2.0f32..2.0,
+        z1 in -0.4f32..-0.13, yaw in -2.0f32..2.0, mass in 0.0f32..22.0,
+    ) {
+        let payload = Payload { mass, ..two_kg() };
+        let start = Pose { x: r0 * a0.cos(), y: r0 * a0.sin(), z: -0.2, yaw: 0.0 };
+        let end = Pose { x: r1 * a1.cos(), y: r1 * a1.sin(), z: z1, yaw };
+        let from = kinematics::inverse(&IRB_930, &start, kinematics::Elbow::Positive, &Vector4::zeros());
+        let Ok(from) = from else { return Ok(()) };
+        let Ok(trajectory) = plan(&IRB_930, &payload, &from, Target::Line(end, Posture::NEAREST), 1.0) else { return Ok(()) };
+        check(&IRB_930, &payload, &trajectory)?;
+    }
 }
 
 /// Analytic derivatives of a line against differences of its positions.

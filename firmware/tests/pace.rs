@@ -335,10 +335,10 @@ fn ride(from: &Vector4<f32>, to: &Vector4<f32>, ride: &Ride) -> Result<(), TestC
         }
         if run.queue.completed() != told {
             let end = ends[usize::from(run.queue.completed()) - 1];
-            for axis in 0..4 {
+            for (axis, jerk) in JERK.iter().enumerate() {
                 let near = (here.q[axis] - end[axis]).abs();
                 prop_assert!(
-                    near < JERK[axis] * time * time * time + 1e-5,
+                    near < jerk * time * time * time + 1e-5,
                     "{near} from the end at {sample}"
                 );
             }

@@ -31,7 +31,7 @@ use super::torque_budget::TorqueBudget;
 use super::{Reference, Trajectory};
 use crate::mechanics::arm::ArmModel;
 use jump::{Chamfer, Jump};
-use verify::{Before, LINE_STEPS};
+use verify::{Before, HALF_STEPS, LINE_STEPS};
 
 /// Survey points on a line.
 const SURVEY_POINTS: u8 = 24;
@@ -135,7 +135,7 @@ impl Planner {
         let compose = ROUNDS as u32 + 1;
         let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
         // Its ends, and the borders of the travel's seven segments; motion and torques.
-        let verify = 2 * (LINE_STEPS as u32 + 2 + 8);
+        let verify = 2 * (LINE_STEPS as u32 + 2 * HALF_STEPS as u32 + 2 + 8);
         let finish = 1;
         locate + survey + compose + balance + jump::STEPS + verify + finish
     };

@@ -139,6 +139,17 @@ impl SCurve {
         }
     }
 
+    /// Duration of the half that is under way at `t`, s; infinite at the peak speed between them.
+    pub fn half_at(&self, t: f32) -> f32 {
+        if t < self.accelerate.duration() {
+            self.accelerate.duration()
+        } else if t < self.brake_start() {
+            f32::INFINITY
+        } else {
+            self.brake.duration()
+        }
+    }
+
     /// First segment border after `t`, s; infinite from the end on. Jerk changes at a border, so the extrema of a move
     /// are often there.
     #[inline(never)]

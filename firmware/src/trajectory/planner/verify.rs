@@ -15,6 +15,8 @@ use crate::trajectory::{Reference, Trajectory};
 /// their own.
 const JOINT_STEPS: u8 = 16;
 pub(super) const LINE_STEPS: u8 = 24;
+/// Least steps along a line while it speeds up, and while it brakes.
+pub(super) const HALF_STEPS: u8 = 12;
 /// Share of the limits of speed, acceleration, jerk and torque rate that the samples of a line may use: there is more between them, and
 /// of rates they show the mean over a step.
 const LINE_SHARE: f32 = 0.9;
@@ -126,7 +128,11 @@ impl Planner {
             Path::Joint { .. } => JOINT_STEPS,
             Path::Line { .. } => LINE_STEPS,
         };
-        let step = span / f32::from(steps);
+        let mut step = span / f32::from(steps);
+        if matches!(path, Path::Line { .. }) {
+            // One that ends next to the stretched arm brakes within a small part of its time.
+            step = least(step, profile.half_at(t) / f32::from(HALF_STEPS));
+        }
         // A border next to the last sample adds nothing, and rounding must not stall the pass.
         let soon = t + 0.05 * step;
         let mut next = least(t + step, *span);
