@@ -323,9 +323,8 @@ fn ride(from: &Vector4<f32>, to: &Vector4<f32>, ride: &Ride) -> Result<(), TestC
         let here = run.setpoint.reference;
         // The speed is at most that of the faster end, and what torques can add in between.
         let time = steps as f32 * PERIOD;
-        for axis in 0..4 {
-            let gain =
-                here.qdd[axis].abs().max(before.qdd[axis].abs()).max(1.0) + JERK[axis] * time;
+        for (axis, jerk) in JERK.iter().enumerate() {
+            let gain = here.qdd[axis].abs().max(before.qdd[axis].abs()).max(1.0) + jerk * time;
             let speed = here.qd[axis].abs().max(before.qd[axis].abs()) + gain * time;
             let moved = (here.q[axis] - before.q[axis]).abs();
             prop_assert!(

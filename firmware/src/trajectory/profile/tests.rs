@@ -92,8 +92,8 @@ proptest! {
         jerks in prop::array::uniform3(0.4f32..1.0),
         jerk in 1.0f32..6.0,
     ) {
-        let [slow, fast, late, last] = accelerations.map(|share| share * 10f32.powf(most));
-        let [from_rest, peak, to_rest] = jerks.map(|share| share * 10f32.powf(jerk));
+        let [slow, fast, late, last] = accelerations.map(|share| share * libm::powf(10.0, most));
+        let [from_rest, peak, to_rest] = jerks.map(|share| share * libm::powf(10.0, jerk));
         let bounds = Bounds {
             speed,
             jerk: peak,
