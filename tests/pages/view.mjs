@@ -141,7 +141,7 @@ async function everyButtonActs(page) {
     await page.getByLabel("Place", { exact: true }).selectOption("encoder:elbow");
     await page.getByLabel("Fault", { exact: true }).selectOption("encoder:elbow:jump");
     await page.getByLabel("Value", { exact: true }).fill("0.5");
-    await page.getByLabel("Lasts (0: it stays)").fill("0.2");
+    await page.getByLabel("Lasts (0: as long as that, or it stays)").fill("0.2");
     await happens(page, "fault planted: encoder:elbow:jump=0.5@", () => press(page, "Plant the fault"));
     await state(page, "fault");
     check((await page.locator(".verdict .fault").innerText()).length > 10, "the fault is not named");
