@@ -12,6 +12,26 @@ fn even(speed: f32, accelerate: f32, brake: f32, jerk: f32) -> Bounds {
     }
 }
 
+/// Accelerations in the order of time: from rest, to the peak speed, from it, to rest; jerks from rest, at the peak speed, to rest.
+fn uneven(speed: f32, accelerations: [f32; 4], jerks: [f32; 3]) -> Bounds {
+    let [slow, fast, late, last] = accelerations;
+    let [from_rest, peak, to_rest] = jerks;
+    Bounds {
+        speed,
+        jerk: peak,
+        accelerate: HalfBounds {
+            jerk: from_rest,
+            slow,
+            fast,
+        },
+        brake: HalfBounds {
+            jerk: to_rest,
+            slow: last,
+            fast: late,
+        },
+    }
+}
+
 proptest! {
     /// The three derivatives, integrated in f64, reproduce the distance; no bound is exceeded.
     #[test]
@@ -25,12 +45,7 @@ proptest! {
     ) {
         let [slow, fast, late, last] = accelerations.map(|share| share * most);
         let [from_rest, peak, to_rest] = jerks.map(|share| share * jerk);
-        let bounds = Bounds {
-            speed,
-            jerk: peak,
-            accelerate: HalfBounds { jerk: from_rest, slow, fast },
-            brake: HalfBounds { jerk: to_rest, slow: last, fast: late },
-        };
+        let bounds = uneven(speed, [slow, fast, late, last], [from_rest, peak, to_rest]);
         let curve = SCurve::new(distance, &bounds);
         let duration = curve.duration();
         let steps = 4000;
@@ -65,14 +80,7 @@ proptest! {
         jerks in prop::array::uniform3(0.3f32..1.0),
         share in 0.001f32..1.0,
     ) {
-        let [slow, fast, late, last] = accelerations.map(|share| share * 300.0);
-        let [from_rest, peak, to_rest] = jerks.map(|share| share * 20_000.0);
-        let bounds = Bounds {
-            speed,
-            jerk: peak,
-            accelerate: HalfBounds { jerk: from_rest, slow, fast },
-            brake: HalfBounds { jerk: to_rest, slow: last, fast: late },
-        };
+        let bounds = uneven(speed, accelerations.map(|share| share * 300.0), jerks.map(|share| share * 20_000.0));
         let curve = SCurve::new(distance, &bounds);
         let s = share * distance;
         let here = curve.at(curve.time_at(s));
@@ -92,14 +100,7 @@ proptest! {
         jerks in prop::array::uniform3(0.4f32..1.0),
         jerk in 1.0f32..6.0,
     ) {
-        let [slow, fast, late, last] = accelerations.map(|share| share * libm::powf(10.0, most));
-        let [from_rest, peak, to_rest] = jerks.map(|share| share * libm::powf(10.0, jerk));
-        let bounds = Bounds {
-            speed,
-            jerk: peak,
-            accelerate: HalfBounds { jerk: from_rest, slow, fast },
-            brake: HalfBounds { jerk: to_rest, slow: last, fast: late },
-        };
+        let bounds = uneven(speed, accelerations.map(|share| share * libm::powf(10.0, most)), jerks.map(|share| share * libm::powf(10.0, jerk)));
         let curve = SCurve::new(distance, &bounds);
         let SCurve { accelerate, brake, cruise, peak, .. } = curve;
         let sum = accelerate.distance + brake.distance + cruise * peak.speed;
