@@ -204,6 +204,11 @@ impl Controller {
         &self.error
     }
 
+    /// Efforts of the last sample that the model does not explain: N m, N m, N, N m.
+    pub fn disturbance(&self) -> &Vector4<f32> {
+        self.memory.disturbance()
+    }
+
     /// Every limit that has acted since the last call.
     pub fn take_limits(&mut self) -> LimitFlags {
         core::mem::take(&mut self.limits)
@@ -311,16 +316,19 @@ impl Controller {
         probe.end(Phase::Kinematics);
         let model = Model::new(&self.body, &trig, &motion);
         probe.end(Phase::Dynamics);
+        if self.state.is_braking() {
+            // The brake holds: the load it carries must not be mistaken for a disturbance.
+            self.memory = Memory::new();
+        }
+        let corner = self.setup.selection.gains.observer;
+        let disturbance = self.memory.observe(&motion, &model, corner);
         let input = ControlInput {
             motion: &motion,
             task: &task,
             model: &model,
             nominal_inertia: &self.body.nominal_inertia,
+            disturbance: &disturbance,
         };
-        if self.state.is_braking() {
-            // The brake holds: the load it carries must not be mistaken for a disturbance.
-            self.memory = Memory::new();
-        }
         let torque = self.setup.selection.torque(&input, &mut self.memory);
         if !torque.iter().all(|torque| torque.is_finite()) {
             // No finite input leads here; should it happen, close the brake.

@@ -77,6 +77,7 @@ impl Controller {
             task: &Task::new(&ARM.geometry, &trig, &motion),
             model: &Model::new(&self.body, &trig, &motion),
             nominal_inertia: &self.body.nominal_inertia,
+            disturbance: &Vector4::zeros(),
         };
         self.selection.torque(&input, &mut Memory::new()).cast()
     }

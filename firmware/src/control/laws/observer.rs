@@ -34,6 +34,11 @@ impl MomentumObserver {
         }
     }
 
+    /// Estimated disturbance at the joints in the last sample.
+    pub fn residual(&self) -> &Vector4<f32> {
+        &self.residual
+    }
+
     /// Estimated disturbance at the joints after one more sample, positive along +q.
     ///
     /// The corner is bounded to half a radian per sample, where the discrete filter still behaves like the continuous
