@@ -21,6 +21,8 @@ use protocol::messages::{
 use protocol::time::Period;
 use serde::{Deserialize, Serialize};
 
+use crate::control::chatter::Chatter;
+use crate::control::heat::Heat;
 use crate::control::laws::{ControlInput, Memory, Model, Motion, Selection, Task};
 use crate::control::limits;
 use crate::control::monitor::Monitor;
@@ -106,6 +108,8 @@ pub struct Controller {
     setpoint: Setpoint,
     memory: Memory,
     monitor: Monitor,
+    heat: Heat,
+    chatter: Chatter,
     excess: Vector4<f32>,
     error: Vector4<f32>,
     replies: Deque<MotionReply, { 2 * CAPACITY }>,
@@ -142,6 +146,8 @@ impl Controller {
             setpoint: Setpoint::rest(Vector4::zeros()),
             memory: Memory::new(),
             monitor: Monitor::new(&config.arm, &config.setup.monitor, config.period.seconds()),
+            heat: Heat::new(),
+            chatter: Chatter::new(),
             excess: Vector4::zeros(),
             error: Vector4::zeros(),
             replies: Deque::new(),
@@ -207,6 +213,11 @@ impl Controller {
     /// Efforts of the last sample that the model does not explain: N m, N m, N, N m.
     pub fn disturbance(&self) -> &Vector4<f32> {
         self.memory.disturbance()
+    }
+
+    /// Heat of each motor: 1 is what it may have for ever.
+    pub fn heat(&self) -> &Vector4<f32> {
+        self.heat.shares()
     }
 
     /// Every limit that has acted since the last call.
@@ -280,6 +291,7 @@ impl Controller {
         if readings.steps > 1 {
             self.bridge(readings.steps);
         }
+        self.warm(&measured_torque, readings.steps);
         self.watch(readings, &q, &qd);
         self.wait(readings);
         if !self.state.is_powered() {
@@ -289,6 +301,7 @@ impl Controller {
             self.error = Vector4::zeros();
             self.excess = Vector4::zeros();
             self.saturated = 0;
+            self.chatter = Chatter::new();
             return self.torque_off();
         }
         let period = self.config.period.seconds();
@@ -308,6 +321,7 @@ impl Controller {
             qdd_ahead: ahead.qdd,
             lead,
             period,
+            elapsed: period * readings.steps as f32,
             excess: self.excess,
         };
         probe.end(Phase::Reference);
@@ -316,8 +330,8 @@ impl Controller {
         probe.end(Phase::Kinematics);
         let model = Model::new(&self.body, &trig, &motion);
         probe.end(Phase::Dynamics);
-        if self.state.is_braking() {
-            // The brake holds: the load it carries must not be mistaken for a disturbance.
+        if self.state.is_braking() || readings.steps > self.max_gap {
+            // The brake holds: the load it carries must not be mistaken for a disturbance. Nor what has not been seen.
             self.memory = Memory::new();
         }
         let corner = self.setup.selection.gains.observer;
@@ -346,6 +360,9 @@ impl Controller {
             self.strain(readings, &qd);
         } else {
             self.stuck = 0;
+        }
+        if !self.is_even(&limited.motor_torque) {
+            return self.torque_off();
         }
         probe.end(Phase::Limits);
         Actions {

@@ -54,6 +54,8 @@ pub struct MoveQueue {
     asked: f32,
     /// Pace at which the torque was found to suffice.
     found: f32,
+    /// Pace at which the motors do not get too hot. Only moves that begin follow it.
+    cool: f32,
     /// Where the last planned move ends: the next one starts there.
     plan_end: Vector4<f32>,
     completed: u8,
@@ -69,6 +71,7 @@ impl MoveQueue {
             clock: Clock::new(1.0),
             asked: 1.0,
             found: 1.0,
+            cool: 1.0,
             plan_end: Vector4::zeros(),
             completed: 0,
         }
@@ -107,7 +110,7 @@ impl MoveQueue {
 
     /// Share of its planned speed at which a move passes, once it has got there.
     pub fn pace(&self) -> f32 {
-        self.asked.min(self.found)
+        self.asked.min(self.found).min(self.cool)
     }
 
     /// Share of its planned speed at which the move under way passes, or the next one will begin.
@@ -125,10 +128,15 @@ impl MoveQueue {
         self.try_full_pace();
     }
 
+    /// Pace at which moves may begin for the heat of the motors.
+    pub fn set_cool_pace(&mut self, pace: f32) {
+        self.cool = pace;
+    }
+
     /// Forgets the pace at which the torque was found to suffice: for another payload, say.
     pub fn try_full_pace(&mut self) {
         self.found = 1.0;
-        self.clock.set_pace(self.asked);
+        self.clock.set_pace(self.pace());
     }
 
     /// Slows down for want of torque, of which the move needs `excess` times as much as there is. `now` where that helps: an arm that

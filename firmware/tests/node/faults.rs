@@ -129,6 +129,15 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             arm.payload_max = -1.0;
             Bench::with(Config::new(arm, PERIOD))
         }
+        Cause::Overload => {
+            let mut config = Config::new(IRB_930, PERIOD);
+            // Nothing moves, whatever the torque.
+            config.setup.monitor.collision = f32::MAX;
+            config.setup.thermal_time = 1.0;
+            let mut bench = Bench::with(config);
+            bench.enable();
+            bench
+        }
         _ => Bench::enabled(),
     };
     let repeat = |bench: &mut Bench, frame: CanFrame| {
@@ -202,6 +211,23 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.status = DriveStatus::READY;
             bench.step()
         }
+        Cause::Collision => {
+            // 1.6 m/s from one sample to the next, at rest before.
+            bench.velocity[2] = 400.0;
+            bench.run(4)
+        }
+        Cause::Chatter => (0..100)
+            .flat_map(|_| {
+                // 0.08 rad/s, to and fro.
+                bench.velocity[1] = if bench.velocity[1] > 0.0 { -4.0 } else { 4.0 };
+                bench.step()
+            })
+            .collect(),
+        Cause::Overload => {
+            // 1.3 times the rated torque.
+            bench.torque[2] = 1300;
+            bench.run(3000)
+        }
         Cause::None
         | Cause::DuplicateNode
         | Cause::Babbling
@@ -247,6 +273,9 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
                 "drive fault: drive status ready torque-on fault encoder-valid".into()
             }
             Cause::EncoderFault => "encoder fault: drive status ready torque-on".into(),
+            Cause::Collision => "collision, axis 3 (lift): 1874.9 N, limit 688.0 N".into(),
+            Cause::Chatter => "chatter, axis 2 (elbow): 41 %, limit 40 %".into(),
+            Cause::Overload => "overload, axis 3 (lift): 120 %, limit 120 %".into(),
             _ => String::new(),
         };
         assert_eq!(state.fault().to_string(), expected);

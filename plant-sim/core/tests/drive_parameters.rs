@@ -241,7 +241,7 @@ fn an_operator_reads_and_sets_what_the_drives_have() {
         ParameterRequest::Set { index, value: 9.0 },
         ParameterRequest::Get { index },
         ParameterRequest::List {
-            from: ControllerParameter::SaturationTime.rule().number + 1,
+            from: ControllerParameter::ThermalTime.rule().number + 1,
         },
     ];
     for (request, counter) in requests.iter().zip(1..) {

@@ -69,6 +69,7 @@ impl Controller {
             qdd_ahead: reference.qdd,
             lead: 0.0,
             period: 1e-3,
+            elapsed: 1e-3,
             excess: Vector4::zeros(),
         };
         let trig = Trig::new(&q);

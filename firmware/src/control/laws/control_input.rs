@@ -49,6 +49,8 @@ pub struct Motion<'a> {
     pub lead: f32,
     /// Sampling period, s.
     pub period: f32,
+    /// Time since the last sample that has arrived, s.
+    pub elapsed: f32,
     /// What the limits cut off the efforts of the last sample; 0 where nothing was cut.
     pub excess: Vector4<f32>,
 }
