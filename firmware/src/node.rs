@@ -29,7 +29,7 @@ use crate::control::states::Event;
 
 /// Default age of the feedback at which the drives count as silent: torque off, brake.
 pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
-/// Planning pauses every tenth sample, so that no report waits longer: half the period of the state at 1 kHz, for a
+/// Planning pauses every tenth sample, for the heat of the motors, and so that no report waits longer: half the period of the state at 1 kHz, for a
 /// tenth of the planning. Counted in samples and not in time, so that the same feedback gives the same torques.
 const REPORT_SAMPLES: u32 = 10;
 /// Answers that may wait for such a sample; with more, reports are sent in spite of planning. Two leave room in the
@@ -218,19 +218,20 @@ impl Node {
         false
     }
 
-    /// Judges the counter of a feedback. As long as there is torque, one whose counter looks new but whose sample is not is old all the
-    /// same, half a turn of the counter late or sent by another node, and must not take the place of the next one.
+    /// Judges the place of a feedback. As long as there is torque, one whose sample is not new is old whatever its counter says, half a turn
+    /// of that late or sent by another node, and must not take the place of the next one.
     fn judge(&mut self, feedback: &Feedback, counter: u8) -> Verdict {
-        let mut receiver = self.feedback;
-        let verdict = receiver.check(counter);
-        let is_old = self.newest.is_some_and(|(last, _)| {
-            feedback.sample.wrapping_sub(last).wrapping_sub(1) >= u32::MAX / 2
-        });
-        if verdict.is_new() && is_old && self.controller.state().is_powered() {
-            return Verdict::Stale(1);
+        if let Some((last, _)) = self.newest
+            && let behind = last.wrapping_sub(feedback.sample)
+            && behind < u32::MAX / 2
+            && self.controller.state().is_powered()
+        {
+            return match behind {
+                0 => Verdict::Duplicate,
+                _ => Verdict::Stale(1),
+            };
         }
-        self.feedback = receiver;
-        verdict
+        self.feedback.check(counter)
     }
 
     /// One control sample: the only place where the control advances. Returns whether planning took a step.
@@ -273,7 +274,12 @@ impl Node {
         // Now that the command is on its way. By sample count and not by time, so that the same
         // feedback gives the same torques whenever it arrives.
         self.samples = self.samples.wrapping_add(1);
-        let planned = !self.samples.is_multiple_of(REPORT_SAMPLES) && self.controller.plan();
+        let planned = if self.samples.is_multiple_of(REPORT_SAMPLES) {
+            self.controller.tend();
+            false
+        } else {
+            self.controller.plan()
+        };
         probe.end(Phase::Planning);
         planned
     }

@@ -124,7 +124,8 @@ impl Controller {
     #[inline(never)]
     pub fn new(config: Config) -> Self {
         Self {
-            body: Body::new(&config.arm, &config.setup.payload),
+            // Of a model that has passed the self-test.
+            body: Body::default(),
             config: Fixed {
                 arm: config.arm,
                 period: config.period,
@@ -291,7 +292,7 @@ impl Controller {
         if readings.steps > 1 {
             self.bridge(readings.steps);
         }
-        self.warm(&measured_torque, readings.steps);
+        self.heat.add(&measured_torque);
         self.watch(readings, &q, &qd);
         self.wait(readings);
         if !self.state.is_powered() {
@@ -361,9 +362,7 @@ impl Controller {
         } else {
             self.stuck = 0;
         }
-        if !self.is_even(&limited.motor_torque) {
-            return self.torque_off();
-        }
+        self.chatter.keep(&limited.motor_torque);
         probe.end(Phase::Limits);
         Actions {
             control: self.control_word(),

@@ -1,8 +1,7 @@
 //! Heat of the motors: the mean square of the effort of each joint (I2t), as a share of what it may be for ever.
 //!
-//! One axis is looked at in each sample, in turn: a motor warms up in seconds. Moves begin more slowly the warmer the warmest is, so that a
-//! cycle that asks for too much settles at the pace that can be kept up. The effort of a motion goes with the square of its pace and the heat
-//! with the square of that, which is why a little slower is much cooler.
+//! Moves begin more slowly the warmer the warmest is, so that a cycle that asks for too much settles at the pace that can be kept up. The
+//! effort of a motion goes with the square of its pace and the heat with the square of that: a little slower is much cooler.
 
 use nalgebra::Vector4;
 
@@ -18,17 +17,20 @@ const LEAST_PACE: f32 = 0.3;
 /// Heat of the motors.
 #[derive(Clone, Copy, Debug)]
 pub struct Heat {
+    /// Squares of the efforts since the last account, and how many.
+    squares: Vector4<f32>,
+    samples: u32,
     /// Mean square of the effort over the continuous one.
     shares: Vector4<f32>,
-    next: Axis,
 }
 
 impl Heat {
     /// Motors that have not done anything for long.
     pub fn new() -> Self {
         Self {
+            squares: Vector4::zeros(),
+            samples: 0,
             shares: Vector4::zeros(),
-            next: Axis::Shoulder,
         }
     }
 
@@ -37,27 +39,34 @@ impl Heat {
         &self.shares
     }
 
-    /// Looks at one axis: `effort` and `continuous` are N m (lift N), `part` is a sample's share of the time constant. Returns the axis and its heat.
-    pub fn update(
-        &mut self,
-        effort: &Vector4<f32>,
-        continuous: &Vector4<f32>,
-        part: f32,
-    ) -> (Axis, f32) {
-        let axis = self.next;
-        let share = axis.of(effort) / axis.of(continuous);
-        let heat = axis.of_mut(&mut self.shares);
-        // The sample stands for the three others as well.
-        *heat += (share * share - *heat) * clamp(4.0 * part, 0.0, 1.0);
-        self.next = axis.next();
-        (axis, *heat)
+    /// Takes the efforts of a sample, N m (lift N).
+    pub fn add(&mut self, effort: &Vector4<f32>) {
+        self.squares += effort.component_mul(effort);
+        self.samples = self.samples.saturating_add(1);
     }
 
-    /// Pace at which moves may begin.
-    pub fn pace(&self) -> f32 {
-        let cooler = (HOT - self.shares.max()) / (HOT - WARM);
-        clamp(cooler, LEAST_PACE, 1.0)
+    /// Accounts for what was taken since the last time; `part` is a sample's share of the time constant. Returns the warmest axis.
+    pub fn account(&mut self, continuous: &Vector4<f32>, part: f32) -> (Axis, f32) {
+        let samples = self.samples as f32;
+        let passed = clamp(samples * part, 0.0, 1.0);
+        let mut warmest = (Axis::Shoulder, 0.0);
+        for axis in Axis::ALL {
+            let continuous = axis.of(continuous);
+            let mean = axis.of(&self.squares) / (continuous * continuous * samples);
+            let share = axis.of_mut(&mut self.shares);
+            *share += (mean - *share) * passed;
+            if *share > warmest.1 {
+                warmest = (axis, *share);
+            }
+        }
+        (self.squares, self.samples) = (Vector4::zeros(), 0);
+        warmest
     }
+}
+
+/// Pace at which moves may begin when the warmest motor has this heat.
+pub fn pace(heat: f32) -> f32 {
+    clamp((HOT - heat) / (HOT - WARM), LEAST_PACE, 1.0)
 }
 
 impl Default for Heat {

@@ -194,21 +194,29 @@ impl Monitor {
         }
     }
 
-    /// Judges the efforts that the model does not explain. An arm that has met something feels them, and so does one whose encoder does
-    /// not show where it is: then they are what its loop makes of that. `wanted` is the velocity of the reference.
-    pub fn feel(
+    /// The first axis with an effort that the model does not explain, of those that it need not.
+    pub fn feels(&mut self, disturbance: &Vector4<f32>) -> Option<Axis> {
+        let axis = first_beyond(disturbance, &self.collision);
+        if axis.is_none() {
+            self.collision_count = 0;
+        }
+        axis
+    }
+
+    /// Judges what an axis feels. An arm that has met something feels it, and so does one whose encoder does not show where it is: then it is
+    /// what its loop makes of that. `wanted` is the velocity of the reference.
+    // Out of line: rarely reached in a sample.
+    #[inline(never)]
+    pub fn felt(
         &mut self,
+        axis: Axis,
         readings: &Readings,
-        qd: &Vector4<f32>,
-        disturbance: &Vector4<f32>,
-        error: &Vector4<f32>,
-        wanted: &Vector4<f32>,
+        [qd, disturbance, error, wanted]: [&Vector4<f32>; 4],
     ) -> Option<Fault> {
-        let beyond = first_beyond(disturbance, &self.collision);
-        if beyond.is_some() && self.collision_count == 0 {
+        if self.collision_count == 0 {
             (self.velocity_felt, self.wanted) = (readings.velocity, *wanted);
         }
-        let axis = count(&mut self.collision_count, beyond, self.needed)?;
+        count(&mut self.collision_count, Some(axis), self.needed)?;
         // Readings of whatever axis that do not go where it went until now are not those of an obstacle, which only slows it down in so few
         // samples.
         let wanted = self.wanted;

@@ -14,7 +14,7 @@ use crate::mechanics::kinematics::Trig;
 pub type Torques = Vector5<f32>;
 
 /// Everything that depends on the payload, lumped once instead of in every tick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Body {
     /// Rigid links with payload.
     pub lagrange: Lagrange,

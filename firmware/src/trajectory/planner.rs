@@ -1,12 +1,12 @@
 //! From a request to a trajectory, one bounded step at a time.
 //!
 //! ```text
-//! Locate --> Survey --> Rest --> Compose --> Balance --> Compose --> Jump --> Verify, Load --> Finish
-//!   | path     | reach,   | jerk   ^            |                   | strokes  | one time scale that keeps
-//!   |          | limits,  |        +-- rounds --+                   | over the | every sample inside every
-//!   |          | speeds   |        S-curve whose accelerations      | travel   | limit
-//!   |          |          |        fill the torque limits
-//!   +----------+-------------------------------------------------> Refusal (reason, axis, value, limit)
+//! Aim, Locate --> Survey --> Rest --> Compose --> Balance --> Compose --> Jump --> Verify, Load --> Finish
+//!   | end, path    | reach,   | jerk   ^            |                   | strokes  | one time scale that keeps
+//!   |              | limits,  |        +-- rounds --+                   | over the | every sample inside every
+//!   |              | speeds   |        S-curve whose accelerations      | travel   | limit
+//!   |              |          |        fill the torque limits
+//!   +--------------+-------------------------------------------------> Refusal (reason, axis, value, limit)
 //! ```
 //!
 //! Constant joint acceleration limits would waste half of the robot: a SCARA is bounded by motor torque, and inertia
@@ -48,10 +48,11 @@ const NO_TRAVEL: f32 = 1e-6;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Idle,
-    /// Path to the target.
+    /// Joint positions of the target.
+    Aim,
+    /// Path to them.
     Locate {
-        /// Its joint positions.
-        end: Result<Vector4<f32>, Refusal>,
+        end: Vector4<f32>,
     },
     Survey {
         point: u8,
@@ -130,7 +131,7 @@ pub struct Planner {
 impl Planner {
     /// Number of calls of [`Planner::work`] after which a plan is complete or refused.
     pub const MAX_STEPS: u32 = {
-        let locate = 1;
+        let locate = 2;
         let survey = SURVEY_POINTS as u32 + 1 + 3;
         let compose = ROUNDS as u32 + 1;
         let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
@@ -186,16 +187,13 @@ impl Planner {
         self.draft.sequence
     }
 
-    /// Takes a request for a move from the joint positions `from`, and finds its end: inverse kinematics are as much as a step
-    /// of planning.
-    pub fn begin(&mut self, arm: &ArmModel, request: &Request, from: &Vector4<f32>) {
+    /// Takes a request for a move from the joint positions `from`.
+    pub fn begin(&mut self, request: &Request, from: &Vector4<f32>) {
         self.target = request.target;
         self.speed = request.speed;
         self.draft.sequence = request.sequence;
         self.draft.end = *from;
-        self.stage = Stage::Locate {
-            end: request.target.end(arm, from),
-        };
+        self.stage = Stage::Aim;
     }
 
     /// One step of planning: one sample of the move, or one profile. When the plan is complete, `Ok`
@@ -203,7 +201,8 @@ impl Planner {
     pub fn work(&mut self, budget: &TorqueBudget<'_>) -> Option<Result<(), Refusal>> {
         let step = match self.stage {
             Stage::Idle => return None,
-            Stage::Locate { end } => self.locate(budget.arm, end),
+            Stage::Aim => self.aim(budget.arm),
+            Stage::Locate { end } => self.locate(budget.arm, &end),
             Stage::Survey { point, fastest } => self.survey(budget, point, fastest),
             Stage::Rest { place } => self.rest(budget, place),
             Stage::Raise { down } => {
@@ -262,17 +261,21 @@ impl Planner {
         &self.draft
     }
 
-    /// The path to the target.
+    /// The end of the move: inverse kinematics are as much as a step of planning.
     #[inline(never)]
-    fn locate(
-        &mut self,
-        arm: &ArmModel,
-        end: Result<Vector4<f32>, Refusal>,
-    ) -> Result<(), Refusal> {
+    fn aim(&mut self, arm: &ArmModel) -> Result<(), Refusal> {
         if !(self.speed > 0.0 && self.speed <= 1.0) {
             return Err(Refusal::value(RefusalReason::OutOfRange, self.speed, 1.0));
         }
-        let (path, gate) = self.target.path(arm, &self.draft.end, &end?)?;
+        let end = self.target.end(arm, &self.draft.end)?;
+        self.stage = Stage::Locate { end };
+        Ok(())
+    }
+
+    /// The path to the target.
+    #[inline(never)]
+    fn locate(&mut self, arm: &ArmModel, end: &Vector4<f32>) -> Result<(), Refusal> {
+        let (path, gate) = self.target.path(arm, &self.draft.end, end)?;
         self.jump = gate.map(Jump::new);
         self.draft.path = path;
         self.draft.start = 0.0;

@@ -191,7 +191,7 @@ impl MoveQueue {
                 return None;
             }
             let request = self.requests.pop_front()?;
-            self.planner.begin(budget.arm, &request, &self.plan_end);
+            self.planner.begin(&request, &self.plan_end);
             return None;
         }
         let planned = self.planner.work(budget)?;

@@ -32,7 +32,6 @@ pub(crate) fn plan(
     let budget = TorqueBudget { arm, body: &body };
     let mut planner = Planner::new();
     planner.begin(
-        arm,
         &Request {
             sequence: 1,
             target,

@@ -9,6 +9,7 @@ use crate::control::laws::Memory;
 use crate::control::monitor::Monitor;
 use crate::control::readings::Readings;
 use crate::control::states::{Event, Halt, State};
+use crate::mechanics::body::Body;
 
 impl Controller {
     /// Takes the transition of the current state on `event`; returns whether there is one.
@@ -17,6 +18,9 @@ impl Controller {
         let Some(next) = self.state.after(event, brake) else {
             return false;
         };
+        if event == Event::SelfTestPassed {
+            self.body = Body::new(&self.config.arm, &self.setup.payload);
+        }
         self.enter(next);
         true
     }
@@ -92,9 +96,15 @@ impl Controller {
         {
             self.fail(fault);
         }
-        let (disturbance, wanted) = (self.memory.disturbance(), &self.setpoint.reference.qd);
-        if let Some(fault) = self.monitor.feel(readings, qd, disturbance, &error, wanted) {
-            self.fail(fault);
+        let felt = self.memory.disturbance();
+        if let Some(axis) = self.monitor.feels(felt) {
+            let wanted = &self.setpoint.reference.qd;
+            let fault = self
+                .monitor
+                .felt(axis, readings, [qd, felt, &error, wanted]);
+            if let Some(fault) = fault {
+                self.fail(fault);
+            }
         }
     }
 

@@ -21,7 +21,7 @@ use crate::mechanics::arm::DriveTrain;
 use crate::mechanics::math::{clamp, tanh};
 
 /// A drive train in the coefficients that conversions need.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub struct Drive {
     /// Diagonal of A: motor radians per joint unit (rad/rad, lift rad/m).
     ratio: Vector4<f32>,

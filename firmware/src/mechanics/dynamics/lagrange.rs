@@ -38,7 +38,7 @@ use crate::mechanics::kinematics::Trig;
 
 /// The dynamics of one arm with one payload, in the lumped coefficients of the equations. Rebuild it when the
 /// payload changes; that is cheap, but not meant for every tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub struct Lagrange {
     /// A, B, G: inertia about their own axes of arm 1, arm 2 and tool, each with the mass carried at its end (kg m^2).
     inertia: Vector3<f32>,
@@ -56,7 +56,7 @@ pub struct Lagrange {
 
 /// Inertial coupling of two bodies, `k(angle) = x cos - y sin` (kg m^2): length of the inner body times the first
 /// moment of mass (x, y) of the outer one, rotated by the angle between them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 struct Coupling {
     x: f32,
     y: f32,
