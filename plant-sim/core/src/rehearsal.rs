@@ -79,7 +79,9 @@ pub struct Refused {
 impl From<OperatorError> for Refused {
     fn from(error: OperatorError) -> Self {
         let spot = match error {
-            OperatorError::Refused { spot, .. } | OperatorError::Unfinished { spot, .. } => spot,
+            OperatorError::Refused { spot, .. }
+            | OperatorError::Unfinished { spot, .. }
+            | OperatorError::Held { spot, .. } => spot,
             _ => None,
         };
         Self {
@@ -159,6 +161,8 @@ struct Stage {
     samples: u64,
     sequence: u8,
     moves: Vec<Move>,
+    /// Whether an override of 0 holds the arm.
+    held: bool,
     /// Numbers of the moves, from the one under way on.
     under_way: VecDeque<(u8, usize)>,
     torque: [f64; 4],
@@ -181,6 +185,7 @@ impl Stage {
             samples: 0,
             sequence: 0,
             moves: Vec::new(),
+            held: false,
             under_way: VecDeque::new(),
             torque: [0.0; 4],
             speed: [0.0; 4],
@@ -207,7 +212,9 @@ impl Stage {
             Action::Request(request) => self.ask(request, spot),
             Action::WaitMode(mode) => self.until("state", |stage| stage.controller.mode() == *mode),
             Action::WaitArrived => {
+                let begun = self.samples;
                 while self.controller.mode() != Mode::Enabled || self.controller.queued() > 0 {
+                    self.heed_hold(begun, action, spot)?;
                     self.sample()?;
                 }
                 Ok(())
@@ -225,6 +232,10 @@ impl Stage {
     fn ask(&mut self, request: &MotionRequest, spot: Option<Spot>) -> Result<(), OperatorError> {
         self.sequence = self.sequence.wrapping_add(1);
         self.controller.request(self.sequence, request);
+        if let MotionRequest::SetOverride { pace } = request {
+            self.held = *pace == 0.0;
+        }
+        let begun = self.samples;
         loop {
             while let Some(reply) = self.controller.take_reply() {
                 match reply.outcome {
@@ -242,6 +253,7 @@ impl Stage {
                     Outcome::Accepted => {}
                 }
             }
+            self.heed_hold(begun, &Action::Request(*request), spot)?;
             self.sample()?;
         }
     }
@@ -263,6 +275,24 @@ impl Stage {
             }
             _ => {}
         }
+    }
+
+    /// An arm that the scenario holds comes to its next rest at once, or not at all.
+    fn heed_hold(
+        &self,
+        begun: u64,
+        action: &Action,
+        spot: Option<Spot>,
+    ) -> Result<(), OperatorError> {
+        let end = begun + (PATIENCE.seconds() / f64::from(self.period)) as u64;
+        if self.held && self.samples > end {
+            return Err(OperatorError::Held {
+                spot,
+                what: action.awaited(self.sequence),
+                limit: PATIENCE,
+            });
+        }
+        Ok(())
     }
 
     fn until(&mut self, what: &str, reached: impl Fn(&Self) -> bool) -> Result<(), OperatorError> {

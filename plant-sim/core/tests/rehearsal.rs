@@ -240,6 +240,45 @@ impl Observer for Ends {
     }
 }
 
+/// More moves than the controller's queue holds, and none of them can end: by the state machine of the queue, four are planned
+/// and the fifth waits for room.
+#[test]
+fn a_scenario_that_holds_the_arm_and_waits_for_it_ends_with_what_it_waits_for() {
+    let to = |x| format!("[[cycle]]\njoints = {{ to = [{x}, 1.4, 0.1, 0.0] }}\n");
+    let hold = "[[cycle]]\noverride = { after = 0.0, to = 0.0 }\n";
+    let release = "[[cycle]]\noverride = { after = 0.0, to = 1.0 }\n";
+    let moves: String = [0.6, 0.5, 0.6, 0.5].map(to).concat();
+    let room = format!("{hold}{moves}{}{release}", to(0.6));
+    // After a stop the arm is still held.
+    let end = format!("{}{hold}[[cycle]]\nstop = 0.1\n{}", to(0.6), to(0.5))
+        + "[[cycle]]\ndwell = 0.1\n"
+        + release;
+    for (steps, key, what) in [
+        (&room, "cycle[5].joints", "no reply to request "),
+        (&end, "cycle[4].dwell", "no end of the move "),
+    ] {
+        let config = scenario(steps);
+        let summary = run(&config);
+        let error = summary.error.unwrap();
+        assert!(summary.sim_time_s < 10.0, "{} s", summary.sim_time_s);
+        let all = refused(&config);
+        let [only] = all.as_slice() else {
+            panic!("{steps}: {all:?}");
+        };
+        for said in [&error, &only.reason] {
+            for words in [key, what, "within 2.0 s", "put an override above 0 before"] {
+                assert!(said.contains(words), "{said}");
+            }
+        }
+    }
+    // As many as there is room for may wait.
+    let config = scenario(&format!(
+        "{hold}{moves}[[cycle]]\noverride = {{ after = 3.0, to = 1.0 }}"
+    ));
+    assert_eq!(refused(&config), []);
+    assert_eq!(run(&config).error, None);
+}
+
 #[test]
 fn a_slow_move_may_take_its_time() {
     let config = scenario(

@@ -31,7 +31,9 @@ pub(super) const POSITIONS: Each<4> = Each([JOINT, JOINT, LENGTH, JOINT]);
 pub(super) const RATE: Allowed = Allowed::within(100.0, 10_000.0, "Hz");
 pub(super) const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
 /// At a ten-thousandth a move takes hours; slower ones are meant otherwise.
-pub(super) const SPEED: Allowed = Allowed::within(1e-4, 1.0, "of full speed");
+const SLOWEST: f64 = 1e-4;
+pub(super) const SPEED: Allowed = Allowed::within(SLOWEST, 1.0, "of full speed");
+const MOVING_PACE: Allowed = Allowed::within(SLOWEST, 1.0, "of the planned speed");
 pub(super) const PACE: Allowed = Allowed::within(0.0, 1.0, "of the planned speed");
 pub(super) const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
 /// A limit of a requirement, in whatever unit.
@@ -257,6 +259,10 @@ impl<'a> Findings<'a> {
             Step::Override(Override { after, to }) => {
                 self.number(&format!("{key}.override.after"), *after, SECONDS);
                 self.number(&format!("{key}.override.to"), *to, PACE);
+                if (0.0..SLOWEST).contains(to) && *to != 0.0 {
+                    let allowed = format!("0, which holds the arm, or {MOVING_PACE}");
+                    self.wrong(&format!("{key}.override.to"), to, allowed);
+                }
             }
             Step::Estop(seconds) => self.number(&format!("{key}.estop"), *seconds, SECONDS),
             Step::Pick(payload) => {
