@@ -287,6 +287,22 @@ fn a_slow_move_may_take_its_time() {
     assert!(rehearse(&config).unwrap().duration_s > 120.0);
 }
 
+/// The arm of a rehearsal obeys no torque. What a law integrates must not grow in it, however long a move takes: a hundredth of
+/// the speed takes a hundred times as long.
+#[test]
+fn a_move_as_slow_as_they_get_is_planned_whatever_the_law_remembers() {
+    let plan = |speed: f64| {
+        let config = scenario(&format!(
+            "[[cycle]]\njump = {{ to = [0.52, 0.1, -0.2, 0.0], top = -0.19, speed = {speed} }}"
+        ));
+        rehearse(&config).unwrap()
+    };
+    let (slow, slowest) = (plan(0.01), plan(0.0001));
+    assert_eq!(slowest.refused, []);
+    let [slow, slowest] = [slow, slowest].map(|plan| plan.moves[0].duration_s);
+    assert!((slowest / slow - 100.0).abs() < 0.1, "{slow}, {slowest}");
+}
+
 #[test]
 fn a_changed_value_is_checked_like_one_of_the_text_and_named_as_it_was_written() {
     let with = |change: &str| {
