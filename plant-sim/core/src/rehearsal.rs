@@ -90,6 +90,7 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, SetupError> {
         torque_utilisation: stage.torque,
         speed_utilisation: stage.speed,
         moves: stage.moves,
+        warnings: config.warnings(),
         refused,
     })
 }

@@ -22,6 +22,8 @@ pub struct Plan {
     pub torque_utilisation: [f64; 4],
     /// Greatest speed over its limit, by joint.
     pub speed_utilisation: [f64; 4],
+    /// What can be run, and will not go as well as one may think.
+    pub warnings: Vec<String>,
     /// What keeps it from running; empty where nothing does. With anything here, the numbers are those of what could be planned.
     pub refused: Vec<Refused>,
 }

@@ -129,11 +129,15 @@ impl ConfigArgs {
             Some(name) => load(Some(name))?,
             None => nominal.clone(),
         };
-        Ok(RunConfig {
+        let config = RunConfig {
             scenario,
             nominal,
             actual,
-        })
+        };
+        for warning in config.warnings() {
+            say!("plant-sim: warning: {warning}");
+        }
+        Ok(config)
     }
 }
 
