@@ -303,7 +303,11 @@ impl<'p> Rig<'p> {
         delivery: &Delivery,
         observer: &mut O,
     ) -> Result<(), RunError> {
-        observer.frame(delivery.time, &delivery.frame)?;
+        if self.is_foreign(delivery) {
+            observer.foreign_frame(delivery.time, &delivery.frame)?;
+        } else {
+            observer.frame(delivery.time, &delivery.frame)?;
+        }
         self.faults.hear(&delivery.frame);
         for seat in 0..self.seats.len() {
             if delivery.to.contains(self.seats[seat].node) {

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use firmware::control::laws::{Gains, Selection};
 use protocol::messages::WristTurn;
-use protocol::time::Duration;
+use protocol::time::{Duration, Period};
 use toml::de::{DeTable, DeValue};
 
 use super::{
@@ -100,8 +100,8 @@ impl Scenario {
         findings.judge()
     }
 
-    /// Checks what depends on the nominal robot: payloads that it may carry, gains that the rate allows, a gripper that
-    /// is empty before a pick and full before a place.
+    /// Checks what depends on the nominal robot or the rate: payloads that it may carry, gains that the rate allows, a gripper that
+    /// is empty before a pick and full before a place, faults that begin before they end.
     ///
     /// # Errors
     /// See [`ScenarioError`].
@@ -115,6 +115,7 @@ impl Scenario {
             findings.gains(gains, command_delay.seconds() as f32);
         }
         findings.gripper(Allowed::within(0.0, robot.payload_max, "kg"));
+        findings.windows();
         findings.judge()
     }
 }
@@ -138,6 +139,18 @@ impl<'a> Findings<'a> {
             0 => Ok(()),
             1 => Err(self.wrong.remove(0)),
             _ => Err(ScenarioError::Several(self.wrong)),
+        }
+    }
+
+    /// Windows whose beginning and end are in different units, and empty at this rate.
+    fn windows(&mut self) {
+        let rate = self.scenario.rate_hz;
+        for (index, fault) in self.scenario.faults.iter().enumerate() {
+            if fault.window.is_empty(Period::of_rate(rate)) {
+                let allowed =
+                    format!("a window that ends after it begins; at {rate} Hz this one does not");
+                self.wrong(&format!("faults[{index}]"), &fault.text, allowed);
+            }
         }
     }
 
