@@ -81,14 +81,22 @@ class Board extends Plots {
         this.player.seek(t);
     }
 
-    /** The faults and requirements of every run. */
+    /** What was injected, the faults and the requirements of every run. */
     list() {
         const fault = ({ time_s: t, text }) => element("li", {}, momentLink(t), ` ${text}`);
         const listed = ({ faults, results }, number) => [
             ...(this.runs.length > 1 ? [element("h3", {}, runKey(number), ` ${results.scenario}`)] : []),
+            ...injected(results.injected ?? []),
             faults.length ? element("ul", {}, ...faults.map(fault)) : element("p", {}, "No fault."),
             ...requirements(results.requirements, this.runs.length > 1 ? `Requirements of ${"AB"[number]}` : "Requirements"),
         ];
         this.events.replaceChildren(...this.runs.flatMap(listed));
     }
+}
+
+/** The faults of the scenario, and when they were in effect. */
+function injected(faults) {
+    const when = ({ times, from_s: from, until_s: until }) =>
+        times ? [` ${times > 1 ? `${times} times, ` : ""}from `, momentLink(from), ` to ${until.toFixed(3)} s`] : [" never in effect"];
+    return faults.length ? [element("ul", {}, ...faults.map((it) => element("li", {}, `Injected: ${it.fault},`, ...when(it))))] : [];
 }

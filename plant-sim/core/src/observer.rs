@@ -70,6 +70,15 @@ pub trait Observer {
         Ok(())
     }
 
+    /// A frame was delivered that another node sent than the one whose message it is. Like any other, unless an observer
+    /// looks behind the identifier.
+    ///
+    /// # Errors
+    /// Output failed; the run ends.
+    fn foreign_frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        self.frame(time, frame)
+    }
+
     /// A node's CAN controller has reported an error, or a change of its error state; the bus is busy for so long with an
     /// attempt to send that is in vain.
     ///
@@ -108,6 +117,10 @@ impl<O: Observer> Observer for &mut O {
         (**self).frame(time, frame)
     }
 
+    fn foreign_frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        (**self).foreign_frame(time, frame)
+    }
+
     fn error(&mut self, time: Instant, error: &ErrorFrame, busy: Duration) -> io::Result<()> {
         (**self).error(time, error, busy)
     }
@@ -130,6 +143,11 @@ impl<O: Observer> Observer for Option<O> {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         self.as_mut()
             .map_or(Ok(()), |observer| observer.frame(time, frame))
+    }
+
+    fn foreign_frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        self.as_mut()
+            .map_or(Ok(()), |observer| observer.foreign_frame(time, frame))
     }
 
     fn error(&mut self, time: Instant, error: &ErrorFrame, busy: Duration) -> io::Result<()> {
@@ -159,6 +177,11 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
         self.0.frame(time, frame)?;
         self.1.frame(time, frame)
+    }
+
+    fn foreign_frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        self.0.foreign_frame(time, frame)?;
+        self.1.foreign_frame(time, frame)
     }
 
     fn error(&mut self, time: Instant, error: &ErrorFrame, busy: Duration) -> io::Result<()> {

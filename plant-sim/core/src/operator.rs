@@ -70,6 +70,8 @@ pub struct Operator {
     slowest: f32,
     /// Speed override.
     pace: f32,
+    /// Whether the program has set it to 0: no move goes on until the program raises it.
+    held: bool,
 }
 
 impl Operator {
@@ -94,6 +96,7 @@ impl Operator {
             last_move: None,
             slowest: 1.0,
             pace: 1.0,
+            held: false,
         }
     }
 
@@ -229,6 +232,9 @@ impl Operator {
                 self.reply = None;
                 let frame = self.send(*request);
                 self.awaited = self.sequence;
+                if let MotionRequest::SetOverride { pace } = request {
+                    self.held = *pace == 0.0;
+                }
                 return frame;
             }
             Action::EmergencyStop => Message::EStop(EStop {
@@ -245,6 +251,7 @@ impl Operator {
     fn send(&mut self, request: MotionRequest) -> Option<CanFrame> {
         if let MotionRequest::SetOverride { pace } = request {
             self.pace = pace;
+            self.held = false;
         }
         self.sequence = self.sequence.wrapping_add(1);
         let sequence = self.sequence;
@@ -295,8 +302,7 @@ impl Operator {
                     _ => {}
                 }
                 // A move is answered once it is planned, which may have to wait until earlier moves leave the queue.
-                let waits = request.is_move() && self.state.is_some_and(|state| state.queue > 0);
-                let limit = if waits {
+                let limit = if request.is_move() && self.queue() > 0 {
                     self.move_limit()
                 } else {
                     REPLY_LIMIT
@@ -326,33 +332,34 @@ impl Operator {
             return Ok(complete);
         }
         Err(match action {
+            _ if self.held && self.queue() > 0 => OperatorError::Held {
+                spot,
+                what: action.awaited(self.awaited),
+                limit,
+            },
             Action::WaitArrived => OperatorError::Unfinished {
                 spot,
                 speed: self.slowest,
                 limit,
             },
             _ => OperatorError::Late {
-                what: self.awaited(action),
+                what: action.awaited(self.awaited),
                 limit,
             },
         })
     }
 
-    fn move_limit(&self) -> Duration {
-        Duration::from_seconds((MOVE_LIMIT_S / f64::from(self.slowest)).min(ANY_MOVE_LIMIT_S))
+    /// Moves that have not ended.
+    fn queue(&self) -> u8 {
+        self.state.map_or(0, |state| state.queue)
     }
 
-    /// What an action waits for, as text.
-    fn awaited(&self, action: &Action) -> String {
-        match action {
-            Action::Hello => "reply to hello".into(),
-            Action::Request(request) => {
-                format!("reply to request {} ({})", self.awaited, request.name())
-            }
-            Action::WaitMode(mode) => format!("state {mode}"),
-            Action::WaitArrived => "end of the move".into(),
-            Action::EmergencyStop | Action::Dwell(_) | Action::Cell(_) => "end of a dwell".into(),
+    fn move_limit(&self) -> Duration {
+        // An arm that is to be held comes to its next rest at once, or not at all.
+        if self.held {
+            return MODE_LIMIT;
         }
+        Duration::from_seconds((MOVE_LIMIT_S / f64::from(self.slowest)).min(ANY_MOVE_LIMIT_S))
     }
 }
 

@@ -5,6 +5,7 @@
 //! its model needs for the planned motion. Whether law, gains and rate can follow the plan is tried in a cycle on the robot that
 //! the controller believes in.
 
+mod plan;
 mod trial;
 
 use std::collections::VecDeque;
@@ -17,10 +18,12 @@ use firmware::mechanics::body::Body;
 use firmware::mechanics::kinematics::Trig;
 use firmware::trajectory::Rates;
 use nalgebra::Vector4;
-use protocol::messages::{Cause, ControlWord, DriveStatus, Mode, MotionRequest, Outcome};
+use protocol::messages::{
+    Cause, Compensation, ControlWord, DriveStatus, Law, Mode, MotionRequest, Outcome,
+};
 use protocol::time::Duration;
-use schemars::JsonSchema;
-use serde::Serialize;
+
+pub use plan::{Move, Plan, Refused};
 
 use crate::operator::program::{Action, Program, Task};
 use crate::setup::{RunConfig, SetupError};
@@ -31,64 +34,11 @@ const SAME: f32 = 1e-5;
 /// Longest wait for anything but a move.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What a scenario comes to as planned.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Plan {
-    /// Scenario.
-    pub scenario: String,
-    /// Robot that the controller believes in.
-    pub robot: String,
-    /// Cycles.
-    pub cycles: u32,
-    /// All of it as planned, from switching on to switching off, without the time until an operator hears of each arrival, s.
-    pub duration_s: f64,
-    /// Moves of the cycles that were planned: those after them are the same as in the last.
-    pub moves: Vec<Move>,
-    /// Greatest effort over its limit, by joint.
-    pub torque_utilisation: [f64; 4],
-    /// Greatest speed over its limit, by joint.
-    pub speed_utilisation: [f64; 4],
-    /// What keeps it from running; empty where nothing does. With anything here, the numbers are those of what could be planned.
-    pub refused: Vec<Refused>,
-}
-
-/// A move as planned.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Move {
-    /// Cycle of the run, counted from 1.
-    pub cycle: u32,
-    /// Key in the scenario, such as `cycle[2].line`.
-    pub step: String,
-    /// How long it takes, s.
-    pub duration_s: f64,
-    /// Greatest effort over its limit, by joint.
-    pub torque_utilisation: [f64; 4],
-}
-
-/// A step that would end the run, or what else would.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Refused {
-    /// Cycle of the run, counted from 1; `null` where it is no single step.
-    pub cycle: Option<u32>,
-    /// Key in the scenario, such as `cycle[2].line`; `null` as above.
-    pub step: Option<String>,
-    /// What is refused and why, in the words of the run.
-    pub reason: String,
-}
-
-impl From<OperatorError> for Refused {
-    fn from(error: OperatorError) -> Self {
-        let spot = match error {
-            OperatorError::Refused { spot, .. } | OperatorError::Unfinished { spot, .. } => spot,
-            _ => None,
-        };
-        Self {
-            cycle: spot.map(|spot| spot.cycle.saturating_add(1)),
-            step: spot.map(|spot| spot.key()),
-            reason: error.to_string(),
-        }
-    }
-}
+/// A law that remembers nothing; the scenario's own has been selected, and refused where it would be, before it.
+const WITHOUT_MEMORY: MotionRequest = MotionRequest::SelectLaw {
+    law: Law::ComputedTorqueJoint,
+    compensation: Compensation::None,
+};
 
 /// Plans a scenario. After a refusal it goes on to the end of the cycle, from where the arm then is: whoever mends one step
 /// wants to know of the others.
@@ -140,6 +90,7 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, SetupError> {
         torque_utilisation: stage.torque,
         speed_utilisation: stage.speed,
         moves: stage.moves,
+        warnings: config.warnings(),
         refused,
     })
 }
@@ -159,6 +110,8 @@ struct Stage {
     samples: u64,
     sequence: u8,
     moves: Vec<Move>,
+    /// Whether an override of 0 holds the arm.
+    held: bool,
     /// Numbers of the moves, from the one under way on.
     under_way: VecDeque<(u8, usize)>,
     torque: [f64; 4],
@@ -183,6 +136,7 @@ impl Stage {
             samples: 0,
             sequence: 0,
             moves: Vec::new(),
+            held: false,
             under_way: VecDeque::new(),
             torque: [0.0; 4],
             speed: [0.0; 4],
@@ -206,10 +160,17 @@ impl Stage {
 
     fn act(&mut self, action: &Action, spot: Option<Spot>) -> Result<(), OperatorError> {
         match action {
+            Action::Request(request @ MotionRequest::Enable) => {
+                // The arm obeys no torque: what a law integrates of rounding errors would grow without end.
+                self.ask(&WITHOUT_MEMORY, spot)?;
+                self.ask(request, spot)
+            }
             Action::Request(request) => self.ask(request, spot),
             Action::WaitMode(mode) => self.until("state", |stage| stage.controller.mode() == *mode),
             Action::WaitArrived => {
+                let begun = self.samples;
                 while self.controller.mode() != Mode::Enabled || self.controller.queued() > 0 {
+                    self.heed_hold(begun, action, spot)?;
                     self.sample()?;
                 }
                 Ok(())
@@ -227,6 +188,10 @@ impl Stage {
     fn ask(&mut self, request: &MotionRequest, spot: Option<Spot>) -> Result<(), OperatorError> {
         self.sequence = self.sequence.wrapping_add(1);
         self.controller.request(self.sequence, request);
+        if let MotionRequest::SetOverride { pace } = request {
+            self.held = *pace == 0.0;
+        }
+        let begun = self.samples;
         loop {
             while let Some(reply) = self.controller.take_reply() {
                 match reply.outcome {
@@ -244,6 +209,7 @@ impl Stage {
                     Outcome::Accepted => {}
                 }
             }
+            self.heed_hold(begun, &Action::Request(*request), spot)?;
             self.sample()?;
         }
     }
@@ -265,6 +231,25 @@ impl Stage {
             }
             _ => {}
         }
+    }
+
+    /// An arm that the scenario holds comes to its next rest at once, or not at all.
+    fn heed_hold(
+        &self,
+        begun: u64,
+        action: &Action,
+        spot: Option<Spot>,
+    ) -> Result<(), OperatorError> {
+        let end = begun + (PATIENCE.seconds() / f64::from(self.period)) as u64;
+        if !self.held || self.samples <= end {
+            return Ok(());
+        }
+        let what = action.awaited(self.sequence);
+        Err(OperatorError::Held {
+            spot,
+            what,
+            limit: PATIENCE,
+        })
     }
 
     fn until(&mut self, what: &str, reached: impl Fn(&Self) -> bool) -> Result<(), OperatorError> {

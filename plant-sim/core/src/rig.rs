@@ -5,6 +5,7 @@
 
 mod errors;
 mod schedule;
+mod timing;
 
 use std::collections::VecDeque;
 use std::io;
@@ -13,13 +14,10 @@ use firmware::control::controller::Config;
 use firmware::mechanics::arm::ArmModel;
 use protocol::frame::CanFrame;
 use protocol::messages::Node;
-use protocol::schema::{MessageInfo, Rate};
-use protocol::table;
 use protocol::time::{Duration, Instant, Period};
-use protocol::wire::{BitTiming, FrameBits};
+use protocol::wire::BitTiming;
 
-use crate::bus::{BuiltinBus, Delivery, NodeId, Overload, Statistics, Traffic};
-use crate::controller::COMPUTE;
+use crate::bus::{BuiltinBus, Delivery, NodeId, Statistics};
 use crate::model::RobotModel;
 use crate::observer::{Observer, Pace, PlantState, Truth};
 use crate::peer::{Outbox, Peer, PeerError};
@@ -28,6 +26,9 @@ use crate::world::Mind;
 use crate::world::OperatorError;
 use crate::world::World;
 use schedule::Schedule;
+
+pub(crate) use timing::command_delay;
+pub use timing::{admit, slowest_answer};
 
 /// Transmit mailboxes of a node: as many as an FDCAN or M_CAN has and more than it needs.
 const MAILBOXES: usize = 32;
@@ -302,7 +303,11 @@ impl<'p> Rig<'p> {
         delivery: &Delivery,
         observer: &mut O,
     ) -> Result<(), RunError> {
-        observer.frame(delivery.time, &delivery.frame)?;
+        if self.is_foreign(delivery) {
+            observer.foreign_frame(delivery.time, &delivery.frame)?;
+        } else {
+            observer.frame(delivery.time, &delivery.frame)?;
+        }
         self.faults.hear(&delivery.frame);
         for seat in 0..self.seats.len() {
             if delivery.to.contains(self.seats[seat].node) {
@@ -341,40 +346,6 @@ impl RigConfig {
         config.setup.command_delay = command_delay(&self.timing).seconds() as f32;
         config
     }
-}
-
-/// Time from a sample until its command acts: two frames and the computing time, on an
-/// otherwise idle bus with about half of the possible stuff bits.
-pub(crate) fn command_delay(timing: &BitTiming) -> Duration {
-    let frame = |info| timing.duration(FrameBits::exact(&specimen(info)));
-    frame(&table::FEEDBACK) + COMPUTE + frame(&table::COMMAND)
-}
-
-fn specimen(info: &MessageInfo) -> CanFrame {
-    info.specimen()
-        .expect("the message table holds lengths that frames can have")
-}
-
-/// Worst-case load of the bus at a control rate.
-///
-/// # Errors
-/// [`Overload`] if it is more than allowed.
-pub fn admit(timing: &BitTiming, rate_hz: f64) -> Result<f64, Overload> {
-    let traffic: Vec<Traffic> = table::TABLE
-        .iter()
-        .filter_map(|info| {
-            let rate = match info.rate {
-                Rate::EverySample => rate_hz,
-                Rate::Hertz(hertz) => f64::from(hertz),
-                Rate::Event => return None,
-            };
-            Some(Traffic {
-                frame: specimen(info),
-                rate,
-            })
-        })
-        .collect();
-    crate::bus::admit(timing, &traffic)
 }
 
 #[cfg(test)]

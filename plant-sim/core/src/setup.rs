@@ -7,7 +7,7 @@ use protocol::wire::BitTiming;
 
 use crate::bus::Overload;
 use crate::maths::hypot;
-use crate::model::{JointLimits, RobotModel};
+use crate::model::{AXES, JointLimits, RobotModel};
 use crate::plant::Plant;
 use crate::plant::arm::Arm;
 use crate::plant::kinematics::{Pose, Unreachable, Violation, inverse};
@@ -15,6 +15,10 @@ use crate::plant::stop::resolvable_step;
 use crate::rig::{self, RigConfig};
 use crate::scenario::{Elbow, Scenario, ScenarioError, Step};
 use crate::text::lines;
+
+/// Samples that a torque has to build up in: with fewer, a cycle takes longer than with more, which the steps between two commands are
+/// the reason of. From four on a shorter time still makes it faster.
+const RISE_SAMPLES: f64 = 2.0;
 
 /// Configuration of a run.
 #[derive(Clone, Debug)]
@@ -147,6 +151,37 @@ impl RunConfig {
         } else {
             SetupError::Several(wrong)
         })
+    }
+
+    /// What can be run, and will not go as well as one may think.
+    pub fn warnings(&self) -> Vec<String> {
+        let rate = self.scenario.rate_hz;
+        let (timing, limits) = (BitTiming::default(), &self.nominal.limits);
+        let mut warnings = Vec::new();
+        let answer = rig::slowest_answer(&timing).seconds();
+        if answer * rate > 1.0 && rig::admit(&timing, rate).is_ok() {
+            warnings.push(format!(
+                "at {rate} Hz some commands come after the next sample: with another frame in its way a command is there {:.0} us after \
+                 its sample, and the next one is taken after {:.0} us; up to {:.0} Hz every one is in time",
+                answer * 1e6,
+                1e6 / rate,
+                (1.0 / answer).floor()
+            ));
+        }
+        let least = RISE_SAMPLES / rate;
+        let short = AXES
+            .iter()
+            .zip(limits.effort_rise_time)
+            .find(|(_, time)| *time < least);
+        if let Some((axis, time)) = short {
+            warnings.push(format!(
+                "model {}: joint_limits.effort_rise_time_s of the {axis} is {time} s, less than two samples at {rate} Hz: a command holds \
+                 for a whole sample, so that motors come to their limits and moves are slowed down instead of getting faster; say \
+                 {least} s or more, or raise the rate",
+                self.nominal.name
+            ));
+        }
+        warnings
     }
 
     /// Target of the tool at the end of a cycle: x, y, z (m) and yaw (rad) in frame 0; none after a stop on the path.

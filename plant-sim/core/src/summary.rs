@@ -1,5 +1,6 @@
 //! Summary of a run, gathered while it runs.
 
+mod injected;
 mod recipe;
 
 use std::io;
@@ -15,6 +16,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use trace::ErrorFrame;
 
+pub use injected::Injected;
+use injected::Windows;
 pub use recipe::{GainsInForce, Model, Models, Recipe};
 
 use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
@@ -88,6 +91,8 @@ pub struct Summary {
     pub overruns: u64,
     /// Frames lost to a full transmit queue.
     pub frames_lost: u64,
+    /// Faults of the scenario, and when each was in effect.
+    pub injected: Vec<Injected>,
     /// Faults that the controller reported; one that follows itself is listed once.
     pub faults: Vec<Fault>,
     /// Simulated time, s.
@@ -114,7 +119,8 @@ pub struct Fault {
     pub code: String,
     /// What it means.
     pub description: &'static str,
-    /// Axis, if one is concerned.
+    /// Axis, if one is concerned and known: an emergency does not say it, and the state that follows names that of the first fault
+    /// alone, as long as it is latched.
     pub axis: Option<&'static str>,
     /// Value found; 0 if the fault has no number.
     pub value: f32,
@@ -140,6 +146,7 @@ impl Fault {
 pub struct Collector {
     metrics: Metrics,
     judge: Judge,
+    windows: Windows,
     faults: Vec<Fault>,
     /// The last state.
     state: Option<State>,
@@ -160,6 +167,7 @@ impl Collector {
         Self {
             metrics: Metrics::new(&config.actual),
             judge: Judge::new(config),
+            windows: Windows::new(&config.scenario),
             faults: Vec::new(),
             state: None,
             pace: 1.0,
@@ -181,6 +189,7 @@ impl Collector {
         let Self {
             metrics,
             judge,
+            windows,
             faults,
             state,
             pace,
@@ -238,6 +247,7 @@ impl Collector {
             bus_errors: bus.total.errors,
             overruns,
             frames_lost,
+            injected: windows.finish(scenario, sim),
             faults,
             sim_time_s: sim.seconds(),
             each_cycle: metrics.cycles,
@@ -303,6 +313,18 @@ impl Observer for Collector {
             _ => {}
         }
         Ok(())
+    }
+
+    /// What another node says in the controller's name is none of its faults, states and commands.
+    fn foreign_frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
+        let timing = &self.timing;
+        self.judge
+            .bus(time, || timing.duration(FrameBits::exact(frame)));
+        Ok(())
+    }
+
+    fn fault(&mut self, number: usize, from: Instant, until: Instant) {
+        self.windows.set(number, from, until);
     }
 
     fn error(&mut self, time: Instant, _: &ErrorFrame, busy: Duration) -> io::Result<()> {

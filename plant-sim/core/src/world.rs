@@ -135,6 +135,20 @@ pub enum OperatorError {
         /// Longest wait.
         limit: Duration,
     },
+    /// The scenario itself holds the arm, and waits for what only a moving arm brings.
+    #[error(
+        "{}no {what} within {:.1} s: an override of 0 holds the arm on its path, so that no move ends and none gets room in the \
+         controller's queue; put an override above 0 before this step",
+        of(*spot), limit.seconds()
+    )]
+    Held {
+        /// Step of the scenario that waits.
+        spot: Option<Spot>,
+        /// What for.
+        what: String,
+        /// Longest wait.
+        limit: Duration,
+    },
     /// Something expected did not arrive in time.
     #[error("the controller is late: no {what} within {:.1} s", limit.seconds())]
     Late {

@@ -203,6 +203,65 @@ fn a_poor_masquerade_changes_no_torque() {
     }
 }
 
+/// What a foreign node says in the controller's name is no fault of the controller: the frames are on the bus, and the summary, which
+/// knows who sent them, has none.
+#[test]
+fn a_foreign_emergency_is_no_fault_of_the_controller() {
+    let (summary, record) = gate("controlleremergency:masquerade@300.5ms..+100ms");
+    assert_ne!(cause(&record), Cause::None, "none of them looks like one");
+    assert!(summary.completed, "{:?}", summary.error);
+    assert_eq!(summary.faults, []);
+    // One of its own is.
+    let (summary, _) = gate("motor:elbow:dead@0.4s");
+    assert_eq!(summary.faults.len(), 1);
+}
+
+/// When a fault was in effect is in the summary: by its text where that says it, by what happened where it depends on that.
+#[test]
+fn the_summary_says_when_a_fault_was_in_effect() {
+    let of = |fault: &str| {
+        let (summary, record) = gate(fault);
+        let [injected] = summary.injected.as_slice() else {
+            panic!("{fault}: {:?}", summary.injected);
+        };
+        assert_eq!(injected.fault, fault);
+        (
+            injected.times,
+            injected.from_s,
+            injected.until_s,
+            summary,
+            record,
+        )
+    };
+    let (times, from, until, ..) = of("command:duplicate@250samples..0.5s");
+    assert_eq!((times, from, until), (1, Some(0.25), Some(0.5)));
+    let (times, from, until, summary, _) = of("payload:dropped@0.5s");
+    assert_eq!(
+        (times, from, until),
+        (1, Some(0.5), Some(summary.sim_time_s))
+    );
+    for never in ["payload:dropped@100s", "payload:dropped@jump9"] {
+        let (times, from, until, ..) = of(never);
+        assert_eq!((times, from, until), (0, None, None), "{never}");
+    }
+    let (times, from, until, _, record) = of("command:duplicate@while=moving");
+    let moving = |it: &&sim::observer::Truth| it.mind.mode == Mode::Moving;
+    let of_mode: Vec<f64> = record
+        .truths
+        .iter()
+        .filter(moving)
+        .map(|it| it.plant.t)
+        .collect();
+    // Seen at the sample after the one that was answered so.
+    let first = of_mode[0];
+    let last = of_mode[of_mode.len() - 1];
+    assert!(
+        times >= 1 && (from.unwrap() - first).abs() < 0.0015,
+        "{from:?} {first}"
+    );
+    assert!((until.unwrap() - last).abs() < 0.0025, "{until:?} {last}");
+}
+
 /// At the same instant as the frames of the drives it destroys them, and its own: the arm stops.
 #[test]
 fn a_masquerade_on_the_beat_is_a_bus_error() {

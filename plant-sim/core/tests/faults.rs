@@ -19,6 +19,7 @@ use record::{Record, run_of};
 use sim::faults::{Fault, KINDS};
 use sim::observer::Truth;
 use sim::scenario::Scenario;
+use sim::setup::RunConfig;
 use sim::summary::Summary;
 
 fn run(faults: &[&str], seed: u64) -> (Summary, Record) {
@@ -196,7 +197,27 @@ fn what_is_not_a_fault_is_refused_with_what_is_allowed() {
             "encoder:elbow:stuck@0.3",
             "is not a time; allowed: seconds as 0.3s",
         ),
-        ("encoder:elbow:stuck@0.5s..0.3s", "ends before it begins"),
+        ("encoder:elbow:stuck@0.5s..0.3s", "0.5s..0.3s is empty"),
+        (
+            "encoder:elbow:stuck@0.5s..+0ms",
+            "is empty: it has to end after it begins",
+        ),
+        (
+            "encoder:elbow:stuck@jump4294967296",
+            "allowed: a whole number from 1 to 4294967295, as in jump2",
+        ),
+        (
+            "encoder:elbow:stuck@1.5samples",
+            "allowed: a whole number from 0 to 4294967295, as 300samples",
+        ),
+        (
+            "encoder:elbow:bit=1.5@0.3s",
+            "bit is 1.5; allowed: a whole number from 0 to 31 number of the bit",
+        ),
+        (
+            "command:replay=1.5@0.3s",
+            "allowed: a whole number from 1 to 64 frames",
+        ),
         ("encoder:elbo:stuck@0.3s", "did you mean elbow?"),
         ("encoder:elbow:stuk@0.3s", "did you mean stuck?"),
         ("encodr:elbow:stuck@0.3s", "did you mean encoder?"),
@@ -226,4 +247,30 @@ fn what_is_not_a_fault_is_refused_with_what_is_allowed() {
         error.contains("line 1") && error.contains("did you mean elbow?"),
         "{error}"
     );
+}
+
+/// Sample 300 is at 300 ms, or at 150.
+#[test]
+fn a_window_that_is_empty_at_the_rate_of_the_run_is_refused_by_its_key() {
+    for (rate, fault, empty) in [
+        (1000.0, "encoder:elbow:stuck@400ms..300samples", true),
+        (1000.0, "encoder:elbow:stuck@300samples..300ms", true),
+        (1000.0, "encoder:elbow:stuck@300samples..301ms", false),
+        (2000.0, "encoder:elbow:stuck@300samples..160ms", false),
+    ] {
+        let mut config = RunConfig::new(Scenario::built_in("gate").unwrap());
+        config.scenario.rate_hz = rate;
+        config.scenario.faults = vec![
+            "payload:dropped@9s".parse().unwrap(),
+            fault.parse().unwrap(),
+        ];
+        let said = config.rig().err().map(|error| error.to_string());
+        let expected = format!("faults[1] is {fault}; allowed: a window that ends after it begins");
+        assert_eq!(
+            said.as_ref().is_some_and(|said| said.contains(&expected)),
+            empty,
+            "{said:?}"
+        );
+        assert_eq!(said.is_some(), empty);
+    }
 }

@@ -240,12 +240,67 @@ impl Observer for Ends {
     }
 }
 
+/// More moves than the controller's queue holds, and none of them can end: by the state machine of the queue, four are planned
+/// and the fifth waits for room.
+#[test]
+fn a_scenario_that_holds_the_arm_and_waits_for_it_ends_with_what_it_waits_for() {
+    let to = |x| format!("[[cycle]]\njoints = {{ to = [{x}, 1.4, 0.1, 0.0] }}\n");
+    let hold = "[[cycle]]\noverride = { after = 0.0, to = 0.0 }\n";
+    let release = "[[cycle]]\noverride = { after = 0.0, to = 1.0 }\n";
+    let moves: String = [0.6, 0.5, 0.6, 0.5].map(to).concat();
+    let room = format!("{hold}{moves}{}{release}", to(0.6));
+    // After a stop the arm is still held.
+    let end = format!("{}{hold}[[cycle]]\nstop = 0.1\n{}", to(0.6), to(0.5))
+        + "[[cycle]]\ndwell = 0.1\n"
+        + release;
+    for (steps, key, what) in [
+        (&room, "cycle[5].joints", "no reply to request "),
+        (&end, "cycle[4].dwell", "no end of the move "),
+    ] {
+        let config = scenario(steps);
+        let summary = run(&config);
+        let error = summary.error.unwrap();
+        assert!(summary.sim_time_s < 10.0, "{} s", summary.sim_time_s);
+        let all = refused(&config);
+        let [only] = all.as_slice() else {
+            panic!("{steps}: {all:?}");
+        };
+        for said in [&error, &only.reason] {
+            for words in [key, what, "within 2.0 s", "put an override above 0 before"] {
+                assert!(said.contains(words), "{said}");
+            }
+        }
+    }
+    // As many as there is room for may wait.
+    let config = scenario(&format!(
+        "{hold}{moves}[[cycle]]\noverride = {{ after = 3.0, to = 1.0 }}"
+    ));
+    assert_eq!(refused(&config), []);
+    assert_eq!(run(&config).error, None);
+}
+
 #[test]
 fn a_slow_move_may_take_its_time() {
     let config = scenario(
         "[[cycle]]\njoints = { to = [0.6, 1.5, 0.1, 0.0], speed = 0.002 }\n[[cycle]]\njoints = { to = [0.5, 1.4, 0.1, 0.0] }",
     );
     assert!(rehearse(&config).unwrap().duration_s > 120.0);
+}
+
+/// The arm of a rehearsal obeys no torque. What a law integrates must not grow in it, however long a move takes: a hundredth of
+/// the speed takes a hundred times as long.
+#[test]
+fn a_move_as_slow_as_they_get_is_planned_whatever_the_law_remembers() {
+    let plan = |speed: f64| {
+        let config = scenario(&format!(
+            "[[cycle]]\njump = {{ to = [0.52, 0.1, -0.2, 0.0], top = -0.19, speed = {speed} }}"
+        ));
+        rehearse(&config).unwrap()
+    };
+    let (slow, slowest) = (plan(0.01), plan(0.0001));
+    assert_eq!(slowest.refused, []);
+    let [slow, slowest] = [slow, slowest].map(|plan| plan.moves[0].duration_s);
+    assert!((slowest / slow - 100.0).abs() < 0.1, "{slow}, {slowest}");
 }
 
 #[test]
@@ -304,4 +359,49 @@ fn a_weight_alone_goes_to_what_is_picked() {
     );
     assert!(picking.payload.is_none());
     assert!(picking.carry(0.0).is_err());
+}
+
+/// The run is the oracle: with a warning it has late commands, and without one none.
+#[test]
+fn a_rate_at_which_commands_come_late_is_warned_of() {
+    for (rate_hz, late) in [(2450.0, false), (3500.0, true)] {
+        let mut config = RunConfig::new(Scenario::built_in("gate").unwrap());
+        config.scenario.rate_hz = rate_hz;
+        let warnings = rehearse(&config).unwrap().warnings;
+        assert_eq!(run(&config).overruns > 0, late, "{rate_hz}");
+        assert_eq!(warnings.len(), usize::from(late), "{warnings:?}");
+        // By hand: frames of 136.8, 136.8 and 88.8 us with every stuff bit, and 40 us of computing.
+        assert!(
+            warnings
+                .iter()
+                .all(|said| said.contains("402 us") && said.contains("up to 2485 Hz")),
+            "{warnings:?}"
+        );
+    }
+}
+
+/// A torque that is to build up faster than commands follow each other makes a cycle slower, not faster: the run is the oracle.
+#[test]
+fn a_rise_time_below_two_samples_is_warned_of() {
+    let mut cycles = [0.0; 2];
+    for (cycle, (rise, warned)) in cycles.iter_mut().zip([(0.004, false), (0.001, true)]) {
+        let mut config = RunConfig::new(Scenario::built_in("gate").unwrap());
+        config.scenario.cycles = 2;
+        config.nominal.limits.effort_rise_time[1] = rise;
+        config.nominal.limits.effort_rise_time[0] = rise;
+        let warnings = config.warnings();
+        assert_eq!(warnings.len(), usize::from(warned), "{warnings:?}");
+        let words = [
+            "effort_rise_time_s of the shoulder is 0.001 s",
+            "say 0.002 s or more",
+        ];
+        assert!(
+            warnings
+                .iter()
+                .all(|said| words.iter().all(|word| said.contains(word))),
+            "{warnings:?}"
+        );
+        *cycle = run(&config).cycle_time_s.unwrap().mean;
+    }
+    assert!(cycles[1] > cycles[0], "{cycles:?}");
 }

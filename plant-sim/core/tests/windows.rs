@@ -215,13 +215,13 @@ fn a_fault_waits_for_another() {
 fn a_window_that_means_nothing_is_refused_with_what_is_allowed() {
     for (window, expected) in [
         ("jmp2", "did you mean jump?"),
-        ("jump0", "they count from 1"),
+        ("jump0", "a whole number from 1 to"),
         ("jump2+3", "is not a time; allowed: seconds as 0.3s"),
         ("while=movin", "did you mean moving?"),
         ("3.5samples", "is not a number of samples"),
-        ("10samples..5samples", "ends before it begins"),
-        ("jump2..+0ms", "ends before it begins"),
-        ("0.3s..+0samples", "ends before it begins"),
+        ("10samples..5samples", "is empty: it has to end"),
+        ("jump2..+0ms", "is empty: it has to end"),
+        ("0.3s..+0samples", "is empty: it has to end"),
         ("0.3s..", "is not a time"),
         ("", "is not a time"),
     ] {

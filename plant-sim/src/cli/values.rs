@@ -4,16 +4,24 @@ use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::thread;
 
+use sim::scenario::MAX_CYCLES;
+
 /// Any number; what it may be is checked where it is used.
 pub(super) fn number(text: &str) -> Result<f64, String> {
     text.parse().map_err(|_| "allowed: a number".into())
 }
 
-/// Any whole number; what it may be is checked where it is used.
-pub(super) fn whole(text: &str) -> Result<i64, String> {
+/// A number of cycles; how many there may be is checked with the scenario.
+pub(super) fn cycles(text: &str) -> Result<i64, String> {
+    text.parse()
+        .map_err(|_| format!("allowed: a whole number from 1 to {MAX_CYCLES}"))
+}
+
+/// A seed; what it may be is checked with the scenario.
+pub(super) fn seed(text: &str) -> Result<i64, String> {
     let most = i64::MAX;
     text.parse()
-        .map_err(|_| format!("allowed: a whole number up to {most}"))
+        .map_err(|_| format!("allowed: a whole number from 0 to {most}"))
 }
 
 /// How many of something there are to be.

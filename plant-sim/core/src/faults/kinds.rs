@@ -26,8 +26,28 @@ pub struct Value {
     pub greatest: f64,
     /// Where none is given; `None` where one must be.
     pub default: Option<f64>,
+    /// Whether it is a whole number.
+    pub whole: bool,
     /// Unit and meaning.
     pub unit: &'static str,
+}
+
+impl Value {
+    /// Between two values that a person may choose.
+    pub fn step(&self) -> f64 {
+        if self.whole { 1.0 } else { 0.001 }
+    }
+
+    /// One to begin with: a hundredth of what is allowed can be seen and is no nonsense.
+    pub fn moderate(&self) -> f64 {
+        let hundredth = self.greatest / 100.0;
+        let start = if self.whole {
+            hundredth.ceil()
+        } else {
+            hundredth
+        };
+        self.default.unwrap_or(start)
+    }
 }
 
 const SHARE: Value = Value {
@@ -46,7 +66,15 @@ const fn value(least: f64, greatest: f64, unit: &'static str) -> Value {
         least,
         greatest,
         default: None,
+        whole: false,
         unit,
+    }
+}
+
+const fn whole(least: f64, greatest: f64, unit: &'static str) -> Value {
+    Value {
+        whole: true,
+        ..value(least, greatest, unit)
     }
 }
 
@@ -99,7 +127,7 @@ pub const KINDS: [Kind; 41] = [
     of_message("jitter", Some(SECONDS), "the frame is late by a random time up to this"),
     of_message("duplicate", None, "the frame is sent twice"),
     of_message("corrupt", Some(SHARE), "one bit is wrong inside the node, so that the CRC of the bus is right"),
-    of_message("replay", Some(Value { default: Some(1.0), ..value(1.0, 64.0, "frames") }),
+    of_message("replay", Some(Value { default: Some(1.0), ..whole(1.0, 64.0, "frames") }),
         "the frame is the one sent so many frames before"),
     of_message("masquerade", None, "a foreign node sends the message once a sample, without its end-to-end protection"),
     of_message("forged", None, "a foreign node sends the last frame of the message once a sample, with the next counter and the right CRC"),
@@ -122,7 +150,7 @@ pub const KINDS: [Kind; 41] = [
     of_axis("encoder", "jump", Some(ANGLE), "the reading is off by this"),
     of_axis("encoder", "noise", Some(ANGLE), "the reading is off by a random angle up to this, anew in every sample"),
     of_axis("encoder", "reversed", None, "the reading goes backwards from where it is"),
-    of_axis("encoder", "bit", Some(value(0.0, 31.0, "number of the bit")), "this bit of the reading is always 0"),
+    of_axis("encoder", "bit", Some(whole(0.0, 31.0, "number of the bit")), "this bit of the reading is always 0"),
     of_axis("motor", "dead", None, "the motor gives no torque, and its drive does not notice"),
     of_axis("motor", "dip", None, "the drive has no power: the motor gives no torque, and the drives report a fault"),
     of_axis("motor", "weak", Some(value(0.0, 1.0, "share of the torque")), "the motor gives this share of the torque that it is asked for"),

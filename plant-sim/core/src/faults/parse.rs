@@ -168,17 +168,21 @@ fn number(name: &str, rule: Option<Value>, text: Option<&str>) -> Result<f64, St
     let Value {
         least,
         greatest,
+        whole,
         unit,
         ..
     } = rule;
-    let allowed = format!("{least} to {greatest} {unit}");
+    let a_whole_number = if whole { "a whole number from " } else { "" };
+    let allowed = format!("{a_whole_number}{least} to {greatest} {unit}");
     let Some(text) = text else {
         return rule
             .default
             .ok_or_else(|| format!("{name} needs a value, as in {name}=...; allowed: {allowed}"));
     };
     match text.parse::<f64>() {
-        Ok(number) if (least..=greatest).contains(&number) => Ok(number),
+        Ok(number) if (least..=greatest).contains(&number) && !(whole && number.fract() != 0.0) => {
+            Ok(number)
+        }
         _ => Err(format!("{name} is {text}; allowed: {allowed}")),
     }
 }

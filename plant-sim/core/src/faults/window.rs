@@ -124,6 +124,12 @@ impl Window {
         }
     }
 
+    /// Whether it is certain to end no later than it begins: times and samples compare with a rate alone.
+    pub(crate) fn is_empty(&self, period: Period) -> bool {
+        self.fixed(period)
+            .is_some_and(|(from, until)| until <= from)
+    }
+
     /// Reads what follows the `@`.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
         if let Some(episode) = text.strip_prefix("while=") {
@@ -147,7 +153,7 @@ impl Window {
             _ => false,
         };
         if backwards {
-            return Err(format!("{text} ends before it begins"));
+            return Err(format!("{text} is empty: it has to end after it begins"));
         }
         Ok(Self::From(from, end))
     }
@@ -213,7 +219,8 @@ impl Episode {
                 Ok(number @ 1..) => Some(number),
                 _ => {
                     return Err(format!(
-                        "{text} has the number {digits}; they count from 1, as in jump2"
+                        "{text} is number {digits} of its kind; allowed: a whole number from 1 to {}, as in {name}2",
+                        u32::MAX
                     ));
                 }
             },
@@ -226,7 +233,10 @@ impl Episode {
 fn span(text: &str) -> Result<Span, String> {
     if let Some(number) = text.strip_suffix("samples") {
         return number.parse().map(Span::Samples).map_err(|_| {
-            format!("{text:?} is not a number of samples; allowed: a whole number, as 300samples")
+            format!(
+                "{text:?} is not a number of samples; allowed: a whole number from 0 to {}, as 300samples",
+                u32::MAX
+            )
         });
     }
     let (number, scale) = match text.strip_suffix("ms") {

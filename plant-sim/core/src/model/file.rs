@@ -156,7 +156,8 @@ pub struct Limits {
     /// Largest efforts for a short time.
     #[schemars(transform = by(EFFORT))]
     pub effort_peak: [f64; 4],
-    /// Times in which the motors take up their peak from nothing; 0.010 without it.
+    /// Times in which the motors take up their peak from nothing; 0.010 without it. Four samples or more: with less than two, which is
+    /// warned of, moves become slower, since a command holds for a whole sample and motors come to their limits.
     #[schemars(transform = by(RISE_TIME))]
     pub effort_rise_time_s: Option<[f64; 4]>,
     /// Largest root-mean-square efforts; at most the peak.

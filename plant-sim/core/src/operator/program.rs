@@ -24,6 +24,21 @@ pub(crate) enum Action {
     Cell(CellEvent),
 }
 
+impl Action {
+    /// What it waits for, as text; a request has this number.
+    pub(crate) fn awaited(&self, sequence: u8) -> String {
+        match self {
+            Self::Hello => "reply to hello".into(),
+            Self::Request(request) => {
+                format!("reply to request {sequence} ({})", request.name())
+            }
+            Self::WaitMode(mode) => format!("state {mode}"),
+            Self::WaitArrived => "end of the move".into(),
+            Self::EmergencyStop | Self::Dwell(_) | Self::Cell(_) => "end of a dwell".into(),
+        }
+    }
+}
+
 /// One action, and the step of the scenario that it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Task {

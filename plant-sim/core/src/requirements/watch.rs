@@ -136,8 +136,28 @@ impl Watch {
         self.judged()
     }
 
+    /// How far beyond a limit a value still counts as at it: what the numbers of the wire, f32, do not tell from it. A motor that
+    /// is commanded its limit gives the f32 nearest to it, which may be greater.
+    fn rounding(&self) -> f64 {
+        let Requirement { max, min, .. } = &self.requirement;
+        match self.quantity() {
+            Quantity::Torque | Quantity::Thermal => {
+                f64::from(f32::EPSILON) * max.or(*min).unwrap_or(0.0)
+            }
+            _ => 0.0,
+        }
+    }
+
     fn judged(self) -> Verdict {
-        let nearest = self.nearest;
+        let at_limit = -self.rounding()..0.0;
+        let nearest = self.nearest.map(|nearest| Nearest {
+            margin: if at_limit.contains(&nearest.margin) {
+                0.0
+            } else {
+                nearest.margin
+            },
+            ..nearest
+        });
         Verdict {
             requirement: self.requirement,
             met: nearest.is_some_and(|nearest| nearest.margin >= 0.0),
@@ -213,6 +233,25 @@ mod tests {
             let apart = [max.map(|max| max - value), min.map(|min| value - min)];
             prop_assert!(apart.contains(&Some(margin)));
         }
+    }
+
+    /// The f32 nearest to a limit is not beyond it, and the next but one is.
+    #[test]
+    fn a_torque_that_only_rounding_tells_from_its_limit_is_at_it() {
+        let limit = 0.95;
+        let nearest = limit as f32;
+        let of = |value: f32| {
+            let mut watch = Watch::new(&requirement(Some(limit), None, None));
+            watch.observe(1.0, Some(value.into()));
+            watch.judged()
+        };
+        let (at, beyond) = (
+            of(nearest.next_up()),
+            of(nearest.next_up().next_up().next_up()),
+        );
+        assert!(f64::from(nearest.next_up()) > limit);
+        assert_eq!((at.met, at.margin), (true, Some(0.0)));
+        assert!(!beyond.met && beyond.margin.unwrap() < 0.0);
     }
 
     #[test]

@@ -3,9 +3,10 @@
 use std::io;
 
 use protocol::messages::Node;
+use protocol::table;
 
 use super::Rig;
-use crate::bus::{Affliction, Disturbance, Disturbed, NodeId};
+use crate::bus::{Affliction, Delivery, Disturbance, Disturbed, NodeId};
 use crate::faults::{Impostor, Planned, What};
 use crate::observer::Observer;
 
@@ -45,6 +46,13 @@ impl Rig<'_> {
             return;
         };
         self.faults.follow(fault, wrong);
+    }
+
+    /// Whether a node has sent what only another one may send.
+    pub(super) fn is_foreign(&self, delivery: &Delivery) -> bool {
+        let owner = table::of_frame(&delivery.frame).and_then(|info| info.sender);
+        let owner = owner.and_then(|name| self.named(name));
+        owner.is_some_and(|node| !delivery.from.contains(node))
     }
 
     fn named(&self, name: Node) -> Option<NodeId> {

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use firmware::control::laws::{Gains, Selection};
 use protocol::messages::WristTurn;
-use protocol::time::Duration;
+use protocol::time::{Duration, Period};
 use toml::de::{DeTable, DeValue};
 
 use super::{
@@ -31,7 +31,9 @@ pub(super) const POSITIONS: Each<4> = Each([JOINT, JOINT, LENGTH, JOINT]);
 pub(super) const RATE: Allowed = Allowed::within(100.0, 10_000.0, "Hz");
 pub(super) const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
 /// At a ten-thousandth a move takes hours; slower ones are meant otherwise.
-pub(super) const SPEED: Allowed = Allowed::within(1e-4, 1.0, "of full speed");
+const SLOWEST: f64 = 1e-4;
+pub(super) const SPEED: Allowed = Allowed::within(SLOWEST, 1.0, "of full speed");
+const MOVING_PACE: Allowed = Allowed::within(SLOWEST, 1.0, "of the planned speed");
 pub(super) const PACE: Allowed = Allowed::within(0.0, 1.0, "of the planned speed");
 pub(super) const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
 /// A limit of a requirement, in whatever unit.
@@ -98,8 +100,8 @@ impl Scenario {
         findings.judge()
     }
 
-    /// Checks what depends on the nominal robot: payloads that it may carry, gains that the rate allows, a gripper that
-    /// is empty before a pick and full before a place.
+    /// Checks what depends on the nominal robot or the rate: payloads that it may carry, gains that the rate allows, a gripper that
+    /// is empty before a pick and full before a place, faults that begin before they end.
     ///
     /// # Errors
     /// See [`ScenarioError`].
@@ -113,6 +115,7 @@ impl Scenario {
             findings.gains(gains, command_delay.seconds() as f32);
         }
         findings.gripper(Allowed::within(0.0, robot.payload_max, "kg"));
+        findings.windows();
         findings.judge()
     }
 }
@@ -136,6 +139,18 @@ impl<'a> Findings<'a> {
             0 => Ok(()),
             1 => Err(self.wrong.remove(0)),
             _ => Err(ScenarioError::Several(self.wrong)),
+        }
+    }
+
+    /// Windows whose beginning and end are in different units, and empty at this rate.
+    fn windows(&mut self) {
+        let rate = self.scenario.rate_hz;
+        for (index, fault) in self.scenario.faults.iter().enumerate() {
+            if fault.window.is_empty(Period::of_rate(rate)) {
+                let allowed =
+                    format!("a window that ends after it begins; at {rate} Hz this one does not");
+                self.wrong(&format!("faults[{index}]"), &fault.text, allowed);
+            }
         }
     }
 
@@ -257,6 +272,10 @@ impl<'a> Findings<'a> {
             Step::Override(Override { after, to }) => {
                 self.number(&format!("{key}.override.after"), *after, SECONDS);
                 self.number(&format!("{key}.override.to"), *to, PACE);
+                if (0.0..SLOWEST).contains(to) && *to != 0.0 {
+                    let allowed = format!("0, which holds the arm, or {MOVING_PACE}");
+                    self.wrong(&format!("{key}.override.to"), to, allowed);
+                }
             }
             Step::Estop(seconds) => self.number(&format!("{key}.estop"), *seconds, SECONDS),
             Step::Pick(payload) => {

@@ -139,7 +139,8 @@ pub struct Override {
     /// Seconds after the last move was accepted.
     #[schemars(transform = by(check::SECONDS))]
     pub after: f64,
-    /// Share of the speed that moves are planned with; 0 holds the arm on its path, until another step of the same cycle raises it.
+    /// Share of the speed that moves are planned with, 0.0001 at the least; 0 holds the arm on its path, until another step of the
+    /// same cycle raises it.
     #[schemars(transform = by(check::PACE))]
     pub to: f64,
 }

@@ -13,7 +13,7 @@ use sim::setup::RunConfig;
 use sim::text;
 
 use crate::cli::Failure;
-use crate::cli::values::{number, whole};
+use crate::cli::values::{cycles, number, seed};
 
 /// Scenario where none is named.
 pub(crate) const USUAL: &str = "gate";
@@ -57,7 +57,7 @@ pub(crate) struct ConfigArgs {
     #[arg(long, value_name = "KG", allow_negative_numbers = true, value_parser = number)]
     payload: Option<f64>,
     /// Number of cycles. Short for --set cycles=N.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = cycles)]
     cycles: Option<i64>,
     /// Control rate. Short for --set rate_hz=HZ.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = number)]
@@ -67,7 +67,7 @@ pub(crate) struct ConfigArgs {
     #[arg(long, value_name = "FAULT")]
     fault: Vec<Fault>,
     /// Seed of whatever is random in the faults. Short for --set seed=N.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<i64>,
     /// The robot as the controller knows it: irb930-22-1.05 (the default), irb930-12-0.85 or a model file; also the actual
     /// one, unless --plant-model is given. Configure an external controller the same way: plant-sim model NAME|FILE.
@@ -129,11 +129,15 @@ impl ConfigArgs {
             Some(name) => load(Some(name))?,
             None => nominal.clone(),
         };
-        Ok(RunConfig {
+        let config = RunConfig {
             scenario,
             nominal,
             actual,
-        })
+        };
+        for warning in config.warnings() {
+            say!("plant-sim: warning: {warning}");
+        }
+        Ok(config)
     }
 }
 

@@ -9,7 +9,7 @@ use plant_sim::verdicts::{ending, finding, limit};
 use sim::model::AXES;
 use sim::scenario::Ending;
 use sim::setup::RunConfig;
-use sim::summary::Summary;
+use sim::summary::{Injected, Summary};
 
 /// A line of text; writing to a string cannot fail.
 macro_rules! line {
@@ -194,6 +194,10 @@ fn load(summary: &Summary, text: &mut String) {
 
 /// End of the run.
 fn end(summary: &Summary, text: &mut String) {
+    for (index, injected) in summary.injected.iter().enumerate() {
+        let name = if index == 0 { "injected" } else { "" };
+        line!(text, "  {name:<18}{}: {}", injected.fault, when(injected));
+    }
     if summary.faults.is_empty() {
         line!(text, "  faults            none");
     }
@@ -215,6 +219,17 @@ fn end(summary: &Summary, text: &mut String) {
             "not at rest on a closed brake"
         };
         line!(text, "  arm in the end    {rest}");
+    }
+}
+
+/// When a fault was in effect.
+fn when(injected: &Injected) -> String {
+    match (injected.from_s, injected.until_s) {
+        (Some(from), Some(until)) if injected.times > 1 => {
+            format!("{} times, from {from:.3} s to {until:.3} s", injected.times)
+        }
+        (Some(from), Some(until)) => format!("from {from:.3} s to {until:.3} s"),
+        _ => "never in effect".into(),
     }
 }
 
