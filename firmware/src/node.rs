@@ -5,10 +5,11 @@
 //! only ages the feedback. So lock-step, a virtual bus in real time and a real bus all run the same code path.
 
 mod parameters;
+mod peers;
 
 use nalgebra::Vector4;
 use protocol::bus::Transmit;
-use protocol::codec::{self, DecodeError, Encoder};
+use protocol::codec::{self, Encoder};
 use protocol::counters::Counters;
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::frame::CanFrame;
@@ -17,7 +18,6 @@ use protocol::messages::{
     MotionRequest, NmtCommand, Node as Name, ParameterReply, Refusal, RefusalReason, ResetReason,
     Server, State,
 };
-use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use crate::control::controller::{Config, Controller};
@@ -216,8 +216,15 @@ impl Node {
                 let for_us = nmt.node == 0 || nmt.node == Name::Controller.code();
                 self.reset_asked |= for_us && nmt.command == NmtCommand::ResetNode;
             }
-            // Messages between other nodes, or to the operator.
-            _ => {}
+            Message::Command(_)
+            | Message::State(_)
+            | Message::MotionReply(_)
+            | Message::ParameterRequest(Server::Drives, _)
+            | Message::ParameterReply(Server::Controller, _)
+            | Message::Emergency(Name::Controller, _)
+            | Message::Heartbeat(Name::Controller, _) => self.meet(message),
+            // Messages between other nodes.
+            Message::Emergency(..) | Message::Heartbeat(..) => {}
         }
         false
     }
@@ -290,46 +297,6 @@ impl Node {
     fn accept(&mut self, verdict: Verdict) -> bool {
         self.received.count(verdict);
         !matches!(verdict, Verdict::Duplicate | Verdict::Stale(_))
-    }
-
-    fn reject(&mut self, error: DecodeError, frame: &CanFrame) {
-        self.received.refuse(&error);
-        if table::FEEDBACK.identifies(frame) {
-            self.suspect(match error {
-                DecodeError::Value(_) | DecodeError::Malformed | DecodeError::NotCanonical => {
-                    Cause::BadValue
-                }
-                _ => Cause::Corrupted,
-            });
-        }
-    }
-
-    /// Counts bad feedback frames; several in a row stop the arm.
-    fn suspect(&mut self, cause: Cause) {
-        self.bad_feedback = self.bad_feedback.saturating_add(1);
-        if u32::from(self.bad_feedback) >= self.controller.setup().bad_frames {
-            let frames = f32::from(self.bad_feedback);
-            self.bad_feedback = 0;
-            self.controller.fail(Fault::value(cause, frames, 0.0));
-        }
-    }
-
-    /// Checks the age of the feedback.
-    fn guard(&mut self, now: Instant) {
-        let Some((_, arrived)) = self.newest else {
-            return;
-        };
-        let age = now.since(arrived);
-        let timeout = self.controller.setup().feedback_timeout;
-        if age > Duration::from_micros(u64::from((timeout * 1e6) as u32)) {
-            let age_ms = age.nanos() as f32 * 1e-6;
-            self.controller
-                .fail(Fault::value(Cause::PeerSilent, age_ms, timeout * 1e3));
-            self.newest = None;
-            self.feedback.reset();
-            self.drives_parameter.reset();
-            self.same_schema = false;
-        }
     }
 
     /// Sends what is due: a reply, an emergency, state and heartbeat.

@@ -24,6 +24,7 @@ feedback-lost   5 ms         stop           brake          nothing        reset
 peer-silent     100 ms       off            off            off            reset
 reordered       3 frames     stop           brake          nothing        reset
 corrupted       3 frames     stop           brake          nothing        reset
+duplicate-node  at once      stop           nothing        nothing        reset
 bad-value       3 frames     off            off            off            reset
 following-error each axis    stop           brake          off            reset
 stuck-sensor    each axis    off            off            off            reset
@@ -69,6 +70,7 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::PeerSilent => "age of the feedback",
         Cause::Reordered => "counter of the feedback: repeated or old",
         Cause::Corrupted => "format, length or CRC of the feedback",
+        Cause::DuplicateNode => "frame that only the controller sends",
         Cause::BadValue => "value in the feedback; once in a torque of the law",
         Cause::FollowingError => "reference against encoder",
         Cause::StuckSensor => {

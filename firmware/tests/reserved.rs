@@ -16,8 +16,7 @@ use std::path::Path;
 
 use protocol::messages::{Cause, ParameterError, RefusalReason};
 
-const CAUSES: [Cause; 5] = [
-    Cause::DuplicateNode,
+const CAUSES: [Cause; 4] = [
     Cause::Babbling,
     Cause::BusOff,
     Cause::Overrun,

@@ -106,7 +106,7 @@ const fn row(
 }
 
 /// Every cause that the controller raises.
-pub static REACTIONS: [Row; 14] = {
+pub static REACTIONS: [Row; 15] = {
     use Latch::{Reset, Restart};
     use Limit::{AtOnce, EachAxis, Frames, Milliseconds};
     use Reaction::{Brake, EmergencyStop, None, Off, Stop};
@@ -136,6 +136,8 @@ pub static REACTIONS: [Row; 14] = {
             [Stop, Brake, None],
             Reset,
         ),
+        // As long as somebody else sends its commands, the stop meets them in every sample.
+        row(Cause::DuplicateNode, AtOnce, [Stop, None, None], Reset),
         // The checksum was right: the sender is wrong, or this controller's own arithmetic.
         row(Cause::BadValue, Frames(BAD_FRAMES), [Off, Off, Off], Reset),
         row(Cause::FollowingError, EachAxis, [Stop, Brake, Off], Reset),

@@ -12,8 +12,9 @@ use protocol::bus::{Transmit, TransmitError};
 use protocol::codec::{decode, encode};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Command, Compensation, ControlWord, DriveStatus, EStop, EStopReason, Feedback, Hello, Message,
-    Mode, Motion, MotionRequest, Outcome, ParameterRequest, RefusalReason, ResetReason, Server,
+    Cause, Command, Compensation, ControlWord, DriveStatus, EStop, EStopReason, Feedback,
+    Heartbeat, Hello, Message, Mode, Motion, MotionRequest, Node as Name, Outcome,
+    ParameterRequest, RefusalReason, ResetReason, Server,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
@@ -283,4 +284,14 @@ pub(crate) fn estop() -> CanFrame {
         counter: 0,
     };
     encode(&Message::EStop(estop), 0).unwrap()
+}
+
+/// A heartbeat of this node in this state.
+pub(crate) fn heartbeat(name: Name, state: Mode, counter: u8) -> CanFrame {
+    let heartbeat = Heartbeat {
+        state,
+        cause: Cause::None,
+        reset: ResetReason::PowerOn,
+    };
+    encode(&Message::Heartbeat(name, heartbeat), counter).unwrap()
 }

@@ -8,11 +8,11 @@ use protocol::e2e::Profile;
 use protocol::frame::CanFrame;
 use protocol::messages::{
     Cause, ControlWord, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode,
-    MotionRequest, Outcome, State,
+    MotionRequest, Node as Name, Outcome, State,
 };
 use protocol::time::Period;
 
-use crate::bench::{Bench, PERIOD, SILENCE, estop, is_off};
+use crate::bench::{Bench, PERIOD, SILENCE, estop, heartbeat, is_off};
 
 fn emergencies(sent: &[Message]) -> Vec<Emergency> {
     sent.iter()
@@ -155,6 +155,13 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             let short = CanFrame::fd(good.id(), &good.data()[..32], true).unwrap();
             repeat(&mut bench, short)
         }
+        Cause::DuplicateNode => {
+            bench
+                .wire
+                .to_node
+                .push_back(heartbeat(Name::Controller, Mode::Ready, 3));
+            bench.step()
+        }
         Cause::BadValue => {
             let frame = not_a_number(&bench.next_feedback());
             repeat(&mut bench, frame)
@@ -202,12 +209,9 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.status = DriveStatus::READY;
             bench.step()
         }
-        Cause::None
-        | Cause::DuplicateNode
-        | Cause::Babbling
-        | Cause::BusOff
-        | Cause::Overrun
-        | Cause::SchemaMismatch => return None,
+        Cause::None | Cause::Babbling | Cause::BusOff | Cause::Overrun | Cause::SchemaMismatch => {
+            return None;
+        }
     };
     Some((bench, sent))
 }
@@ -234,6 +238,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::PeerSilent => "peer silent: 100.0 ms, limit 100.0 ms".into(),
             Cause::Reordered => "reordered: 3 frames in a row".into(),
             Cause::Corrupted => "corrupted: 3 frames in a row".into(),
+            Cause::DuplicateNode => "duplicate node: identifier 0x741".into(),
             Cause::BadValue => "bad value: 3 frames in a row".into(),
             Cause::FollowingError => {
                 "following error, axis 2 (elbow): -0.100 rad, limit 0.050 rad".into()

@@ -13,6 +13,7 @@ mod faults;
 mod gains;
 mod pair;
 mod parameters;
+mod peers;
 mod reports;
 mod requests;
 mod stops;

@@ -223,6 +223,16 @@ fn a_forged_frame_is_believed() {
     );
 }
 
+/// Nobody else sends those, and no node receives its own: the arm stops under control.
+#[test]
+fn a_forged_frame_of_the_controller_stops_the_arm() {
+    for message in ["command", "state", "controllerheartbeat"] {
+        let (summary, record) = gate(&format!("{message}:forged@400.5ms"));
+        assert!(!summary.completed && summary.at_rest, "{message}");
+        assert_eq!(cause(&record), Cause::DuplicateNode, "{message}");
+    }
+}
+
 /// The node's frames wait behind those that it sends without end; the drives let go as if it were silent.
 #[test]
 fn a_babbling_node_stops_the_arm() {

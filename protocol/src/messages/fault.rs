@@ -74,6 +74,8 @@ pub enum Unit {
     DriveStatus,
     /// Code of a [`KnownAnswer`].
     KnownAnswer,
+    /// Identifier of a frame.
+    Identifier,
 }
 
 impl Unit {
@@ -81,7 +83,7 @@ impl Unit {
     #[must_use]
     pub const fn symbol(self) -> &'static str {
         match self {
-            Self::None | Self::DriveStatus | Self::KnownAnswer => "",
+            Self::None | Self::DriveStatus | Self::KnownAnswer | Self::Identifier => "",
             Self::Radian => "rad",
             Self::Metre => "m",
             Self::RadianOrMetre => "rad or m",
@@ -119,6 +121,7 @@ impl Unit {
                 Ok(answer) => f.write_str(answer.name()),
                 Err(unknown) => write!(f, "{unknown}"),
             },
+            Self::Identifier => write!(f, "identifier {:#05x}", value as u16),
         }
     }
 }
@@ -150,6 +153,7 @@ impl Fault {
         use FaultAxis::{Lift, None};
         match (self.cause, self.axis) {
             (Cause::SelfTest, _) => Unit::KnownAnswer,
+            (Cause::DuplicateNode, _) => Unit::Identifier,
             (Cause::DriveFault, _) | (Cause::EncoderFault, None) => Unit::DriveStatus,
             (Cause::FeedbackLost | Cause::PeerSilent | Cause::OverTorque, _) => Unit::Millisecond,
             (Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => Unit::Frame,
@@ -168,7 +172,6 @@ impl Fault {
             (Cause::OverSpeed, _) => Unit::RadianPerSecond,
             (
                 Cause::None
-                | Cause::DuplicateNode
                 | Cause::Babbling
                 | Cause::BusOff
                 | Cause::Overrun

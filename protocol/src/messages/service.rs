@@ -203,7 +203,7 @@ codes! {
         Reordered = 4, "reordered";
         /// Frames arrived with a wrong end-to-end checksum.
         Corrupted = 5, "corrupted";
-        /// Another node sends on the identifier of a peer, or a log is replayed. Reserved: not raised yet.
+        /// Another node sends what only the controller sends: a second controller, or a log that is played.
         DuplicateNode = 6, "duplicate-node";
         /// A position does not change although the axis is off its reference or at its torque limit: encoder or axis is stuck.
         StuckSensor = 7, "stuck-sensor";

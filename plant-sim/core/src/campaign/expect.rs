@@ -20,6 +20,7 @@
 //! | a drive without power for 2 samples or more | 4 samples | the next feedback says so, and one sample to answer |
 //! | the clock of the drives stands still for 9 samples or more | 8 samples | no feedback, so no commands: the drives let go by a clock of their own |
 //! | a clock within 100 ppm, as every crystal is | the same as without it | nobody else counts on a time |
+//! | a foreign node sends a right frame of the controller for 17 samples or more | 16 samples | the controller hears it; on the beat of its own frames only after 32 attempts |
 //! | nobody tells a CAN controller to recover | the same as without it | nothing by itself: only after a bus-off |
 //!
 //! Whatever else breaks is judged by its effect: see [`super::bounds`].
@@ -32,7 +33,7 @@ use super::bounds::FOLLOWING_ERROR;
 use super::spells::Spell;
 use crate::bus::ErrorKind;
 use crate::clock::ClockDefect;
-use crate::faults::{FrameFault, What};
+use crate::faults::{Disguise, FrameFault, What};
 use crate::plant::defect::{EncoderDefect, MotorDefect};
 
 /// Noise of a sound encoder, rad and m: two of its counts at the shoulder.
@@ -81,6 +82,11 @@ fn of(fault: &Spell, period: Period) -> Expected {
         }
     };
     match fault.what {
+        What::Foreign(info, Disguise::Perfect)
+            if info.sender == Some(Node::Controller) && !is_rare(info.content) =>
+        {
+            no_survival(by_length(0, 17, 16))
+        }
         What::Silent(Node::Drives) => by_length(2, 9, 8),
         What::Silent(Node::Controller) | What::Dead(_) => no_survival(by_length(0, 9, 8)),
         What::Babbling(_) | What::Wires(_) => by_length(2, 9, 8),
@@ -117,6 +123,14 @@ fn of(fault: &Spell, period: Period) -> Expected {
         What::Encoder(_, EncoderDefect::Noise(most)) if most <= SOUND_NOISE => Expected::Survived,
         _ => Expected::Either,
     }
+}
+
+/// What a foreign node may never have heard, and cannot repeat.
+fn is_rare(content: Content) -> bool {
+    matches!(
+        content,
+        Content::Emergency(_) | Content::ParameterRequest(_) | Content::ParameterReply(_)
+    )
 }
 
 /// A short one may be survived, but need not.
