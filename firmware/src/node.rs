@@ -26,6 +26,7 @@ use crate::control::phase::{Phase, Probe};
 use crate::control::readings::Readings;
 use crate::control::self_test;
 use crate::control::states::Event;
+use peers::Pulse;
 
 /// Default age of the feedback at which the drives count as silent: torque off, brake.
 pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
@@ -48,6 +49,8 @@ pub struct Node {
     motion: Receiver,
     parameter: Receiver,
     drives_parameter: Receiver,
+    drives: Pulse,
+    operator: Pulse,
     encoder: Encoder,
     received: Counters,
     unsent: u16,
@@ -78,6 +81,8 @@ impl Node {
             motion: Receiver::new(Profile::Fd),
             parameter: Receiver::new(Profile::Fd),
             drives_parameter: Receiver::new(Profile::Fd),
+            drives: Pulse::new(),
+            operator: Pulse::new(),
             encoder: Encoder::default(),
             received: Counters::default(),
             unsent: 0,
@@ -224,7 +229,8 @@ impl Node {
             | Message::Emergency(Name::Controller, _)
             | Message::Heartbeat(Name::Controller, _) => self.meet(message),
             // Messages between other nodes.
-            Message::Emergency(..) | Message::Heartbeat(..) => {}
+            Message::Heartbeat(name, _) => self.hear(*name, counter),
+            Message::Emergency(..) => {}
         }
         false
     }
@@ -243,6 +249,7 @@ impl Node {
             Some((last, _)) => feedback.sample.wrapping_sub(last).max(1),
         };
         self.newest = Some((feedback.sample, now));
+        self.listen(feedback.sample);
         if self.controller.mode() == Mode::PreOperational
             && self.same_schema
             && feedback.status.contains(DriveStatus::ENCODER_VALID)

@@ -22,6 +22,7 @@ const ORACLE: &str = "
 self-test       at once      nothing        nothing        nothing        restart
 feedback-lost   5 ms         stop           brake          nothing        reset
 peer-silent     100 ms       off            off            off            reset
+operator-silent 250 ms       stop           nothing        nothing        reset
 reordered       3 frames     stop           brake          nothing        reset
 corrupted       3 frames     stop           brake          nothing        reset
 duplicate-node  at once      stop           nothing        nothing        reset
@@ -67,7 +68,10 @@ fn seen_by(cause: Cause) -> &'static str {
     match cause {
         Cause::SelfTest => "known answers of mathematics, kinematics and CRC; ranges of the model",
         Cause::FeedbackLost => "sample number of the next feedback",
-        Cause::PeerSilent => "age of the feedback",
+        Cause::PeerSilent => {
+            "age of the feedback; of the heartbeat of the drives, as of the operator's"
+        }
+        Cause::OperatorSilent => "age of the operator's heartbeat, once one was heard",
         Cause::Reordered => "counter of the feedback: repeated or old",
         Cause::Corrupted => "format, length or CRC of the feedback",
         Cause::DuplicateNode => "frame that only the controller sends",

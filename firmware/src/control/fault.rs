@@ -23,6 +23,9 @@ pub const MAX_GAP_MS: u32 = milliseconds(Parameter::FeedbackGap);
 /// Age of the feedback at which the drives count as silent, ms: the watchdog time of moteus and the heartbeat of ODrive.
 /// The drives have switched off long before, after 5 samples without a command.
 pub const PEER_TIMEOUT_MS: u32 = milliseconds(Parameter::FeedbackTimeout);
+/// Time without a heartbeat after which a node whose heartbeat was heard counts as silent, ms: two that are lost, and a third that
+/// is late.
+pub const HEARTBEAT_TIMEOUT_MS: u32 = milliseconds(Parameter::HeartbeatTimeout);
 /// Time at a torque limit of an axis that hardly moves, ms: longer than any start or turning back takes, and short beside the
 /// seconds in which a motor at its peak torque heats up.
 pub const SATURATION_MS: u32 = milliseconds(Parameter::SaturationTime);
@@ -106,7 +109,7 @@ const fn row(
 }
 
 /// Every cause that the controller raises.
-pub static REACTIONS: [Row; 15] = {
+pub static REACTIONS: [Row; 16] = {
     use Latch::{Reset, Restart};
     use Limit::{AtOnce, EachAxis, Frames, Milliseconds};
     use Reaction::{Brake, EmergencyStop, None, Off, Stop};
@@ -122,6 +125,13 @@ pub static REACTIONS: [Row; 15] = {
             Cause::PeerSilent,
             Milliseconds(PEER_TIMEOUT_MS),
             [Off, Off, Off],
+            Reset,
+        ),
+        // Nobody is there to see what the arm does, and nothing is wrong with it.
+        row(
+            Cause::OperatorSilent,
+            Milliseconds(HEARTBEAT_TIMEOUT_MS),
+            [Stop, None, None],
             Reset,
         ),
         row(

@@ -1,14 +1,76 @@
 //! What the other nodes of the bus do wrong: bad frames, silence, and the place of this one.
 
 use protocol::codec::{self, DecodeError};
+use protocol::e2e::{Profile, Receiver};
 use protocol::frame::CanFrame;
-use protocol::messages::{Cause, Fault, Message};
+use protocol::messages::{Cause, Fault, Message, Node as Name};
+use protocol::parameters::Store as _;
 use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use super::Node;
 
+/// The heartbeat of another node. As CiA 301 has it, it is watched from the first one on that was heard.
+#[derive(Clone, Debug)]
+pub(super) struct Pulse {
+    receiver: Receiver,
+    /// Number of the newest sample at the newest heartbeat; `None` while it is not watched.
+    last: Option<u32>,
+}
+
+impl Pulse {
+    /// Nothing has been heard.
+    pub(super) fn new() -> Self {
+        Self {
+            receiver: Receiver::new(Profile::Classical),
+            last: None,
+        }
+    }
+
+    fn forget(&mut self) {
+        self.receiver.reset();
+        self.last = None;
+    }
+}
+
 impl Node {
+    /// A heartbeat of another node.
+    // Out of line: rare.
+    #[inline(never)]
+    pub(super) fn hear(&mut self, name: Name, counter: u8) {
+        let newest = self.newest.map(|(sample, _)| sample);
+        let pulse = match name {
+            Name::Drives => &mut self.drives,
+            Name::Operator => &mut self.operator,
+            Name::Controller => return,
+        };
+        let verdict = pulse.receiver.check(counter);
+        if verdict.is_new() {
+            pulse.last = newest;
+        }
+        self.accept(verdict);
+    }
+
+    /// Whether the others have given a sign of life, at a sample of this number. Counted in samples, so that the same frames lead
+    /// to the same torques whenever they arrive; feedback that stays out is [another matter](Self::guard).
+    pub(super) fn listen(&mut self, sample: u32) {
+        for (pulse, cause) in [
+            (&mut self.drives, Cause::PeerSilent),
+            (&mut self.operator, Cause::OperatorSilent),
+        ] {
+            let Some(last) = pulse.last else {
+                continue;
+            };
+            let age = sample.wrapping_sub(last) as f32 * self.controller.period();
+            let timeout = self.controller.setup().heartbeat_timeout;
+            if age > timeout {
+                pulse.forget();
+                self.controller
+                    .fail(Fault::value(cause, age * 1e3, timeout * 1e3));
+            }
+        }
+    }
+
     pub(super) fn reject(&mut self, error: DecodeError, frame: &CanFrame) {
         self.received.refuse(&error);
         if table::FEEDBACK.identifies(frame) {
@@ -54,6 +116,8 @@ impl Node {
                 .fail(Fault::value(Cause::PeerSilent, age_ms, timeout * 1e3));
             self.newest = None;
             self.feedback.reset();
+            self.drives.forget();
+            self.operator.forget();
             self.drives_parameter.reset();
             self.same_schema = false;
         }

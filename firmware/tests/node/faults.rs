@@ -145,6 +145,13 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.now += SILENCE;
             bench.poll()
         }
+        Cause::OperatorSilent => {
+            bench
+                .wire
+                .to_node
+                .push_back(heartbeat(Name::Operator, Mode::Ready, 0));
+            bench.run(252)
+        }
         Cause::Reordered => {
             let frame = bench.next_feedback();
             bench.wire.to_node.push_back(frame);
@@ -236,6 +243,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::SelfTest => format!("self test: {}", KnownAnswer::Model),
             Cause::FeedbackLost => "feedback lost: 7.0 ms, limit 5.0 ms".into(),
             Cause::PeerSilent => "peer silent: 100.0 ms, limit 100.0 ms".into(),
+            Cause::OperatorSilent => "operator silent: 251.0 ms, limit 250.0 ms".into(),
             Cause::Reordered => "reordered: 3 frames in a row".into(),
             Cause::Corrupted => "corrupted: 3 frames in a row".into(),
             Cause::DuplicateNode => "duplicate node: identifier 0x741".into(),

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use firmware::control::controller::Config;
+use firmware::mechanics::arm::IRB_930;
 use protocol::codec::{decode, encode};
 use protocol::frame::CanFrame;
 use protocol::messages::{
@@ -10,7 +12,7 @@ use protocol::messages::{
 };
 use protocol::table::{self, TABLE};
 
-use crate::bench::{Bench, PERIOD};
+use crate::bench::{Bench, PERIOD, heartbeat};
 
 /// One frame of every message that the controller alone sends, by name: what a second controller on the bus sends.
 fn frames_of_a_controller() -> BTreeMap<&'static str, CanFrame> {
@@ -111,6 +113,98 @@ fn what_only_looks_like_a_frame_of_the_controller_is_dropped() {
             (bench.mode(), bench.node.received().crc),
             (Mode::Enabled, 1),
             "{name}"
+        );
+    }
+}
+
+/// As CiA 301 has it: a node that was never heard is not waited for, one that was is waited for as long as torque is on.
+#[test]
+fn a_heartbeat_is_waited_for_once_it_was_heard() {
+    for (name, cause, state) in [
+        (Name::Operator, Cause::OperatorSilent, Mode::FaultReaction),
+        (Name::Drives, Cause::PeerSilent, Mode::Fault),
+    ] {
+        let mut bench = Bench::enabled();
+        bench.run(1000);
+        assert_eq!(bench.mode(), Mode::Enabled, "never heard");
+        for counter in 0..20 {
+            bench
+                .wire
+                .to_node
+                .push_back(heartbeat(name, Mode::Ready, counter % 16));
+            bench.run(100);
+        }
+        assert_eq!(bench.mode(), Mode::Enabled, "{name} beats");
+        bench.run(150);
+        assert_eq!(bench.mode(), Mode::Enabled, "{name}: 250 ms since");
+        bench.run(2);
+        let found = (bench.mode(), bench.node.controller().cause());
+        assert_eq!(found, (state, cause));
+        // What was lost is not waited for any longer.
+        bench.run(300);
+        assert_eq!(
+            bench.request(MotionRequest::FaultReset),
+            Some(Outcome::Accepted)
+        );
+        bench.request(MotionRequest::Enable);
+        bench.run(1000);
+        assert_eq!(bench.mode(), Mode::Enabled, "{name}");
+    }
+}
+
+/// Who switches off before leaving may come back at any time, with a counter that begins anew.
+#[test]
+fn who_leaves_without_torque_is_not_missed() {
+    let mut bench = Bench::enabled();
+    let beat = |bench: &mut Bench, counter| {
+        let frame = heartbeat(Name::Operator, Mode::Ready, counter);
+        bench.wire.to_node.push_back(frame);
+        bench.run(100);
+    };
+    (0..12).for_each(|counter| beat(&mut bench, counter));
+    bench.request(MotionRequest::Disable);
+    bench.run(1000);
+    assert_eq!(
+        (bench.mode(), bench.node.controller().cause()),
+        (Mode::Ready, Cause::None)
+    );
+    bench.request(MotionRequest::Enable);
+    bench.run(300);
+    (0..4).for_each(|counter| beat(&mut bench, counter));
+    assert_eq!(bench.mode(), Mode::Enabled);
+    assert_eq!(bench.node.received().stale, 0, "a new beginning");
+}
+
+/// One that is repeated, or was recorded, keeps nobody alive.
+#[test]
+fn an_old_heartbeat_is_none() {
+    let mut bench = Bench::enabled();
+    for _ in 0..4 {
+        let frame = heartbeat(Name::Operator, Mode::Ready, 7);
+        bench.wire.to_node.push_back(frame);
+        bench.run(63);
+    }
+    assert_eq!(bench.node.controller().cause(), Cause::OperatorSilent);
+}
+
+#[test]
+fn the_time_without_a_heartbeat_is_a_parameter() {
+    for timeout in [0.15, 0.5] {
+        let mut config = Config::new(IRB_930, PERIOD);
+        config.setup.heartbeat_timeout = timeout;
+        let mut bench = Bench::with(config);
+        bench.enable();
+        let frame = heartbeat(Name::Operator, Mode::Ready, 0);
+        bench.wire.to_node.push_back(frame);
+        bench.step();
+        let mut samples = 0;
+        while bench.mode() == Mode::Enabled {
+            bench.step();
+            samples += 1;
+        }
+        assert!(
+            (f64::from(samples) * 1e-3 - f64::from(timeout)).abs() < 2.5e-3,
+            "{samples} {timeout}"
         );
     }
 }

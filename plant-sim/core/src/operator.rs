@@ -8,12 +8,13 @@ pub(crate) mod program;
 use protocol::codec::{self, Encoder};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, EStop, EStopReason, Hello, Message, Mode, Motion, MotionRequest, Node, Outcome,
-    ParameterReply, ParameterRequest, Server, State,
+    Cause, EStop, EStopReason, Heartbeat, Hello, Message, Mode, Motion, MotionRequest, Node,
+    Outcome, ParameterReply, ParameterRequest, ResetReason, Server, State,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
 
+use crate::heart::Heart;
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::scenario::Scenario;
 use crate::world::{CellEvent, OperatorError, Spot, World};
@@ -31,6 +32,9 @@ const MOVE_LIMIT_S: f64 = 120.0;
 const ANY_MOVE_LIMIT_S: f64 = 1e9;
 /// Time without any frame after which the controller counts as silent: ten heartbeats.
 const SILENCE_LIMIT: Duration = Duration::from_secs(1);
+
+/// Its first heartbeat comes between those of the drives.
+const FIRST_HEARTBEAT: Instant = Instant::from_nanos(50_000_000);
 
 /// Progress of the current action.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +56,7 @@ pub struct Operator {
     /// Polling period, and time of the next poll.
     period: Period,
     next: Instant,
+    heart: Heart,
     given_up: bool,
     encoder: Encoder,
     sequence: u8,
@@ -82,6 +87,7 @@ impl Operator {
             progress: Progress::Due,
             period: Period::of_rate(scenario.rate_hz),
             next: Instant::ORIGIN,
+            heart: Heart::new(FIRST_HEARTBEAT, Period::of_rate(scenario.rate_hz)),
             given_up: false,
             encoder: Encoder::default(),
             sequence: 0,
@@ -121,6 +127,19 @@ impl Operator {
             Message::Emergency(_, emergency) => self.alarmed = emergency.cause != Cause::None,
             _ => {}
         }
+    }
+
+    /// What every poll begins with.
+    fn tick(&mut self, now: Instant, out: &mut Outbox) {
+        self.next = now + self.period.duration();
+        let heartbeat = Heartbeat {
+            state: Mode::Ready,
+            cause: Cause::None,
+            reset: ResetReason::PowerOn,
+        };
+        let encoder = &mut self.encoder;
+        self.heart
+            .beat(now, (Node::Operator, heartbeat), encoder, out);
     }
 
     /// One poll: evaluates what has arrived and acts on it.
@@ -381,7 +400,7 @@ impl Peer for Operator {
         match received {
             Some(frame) => self.receive(now, frame),
             None => {
-                self.next = now + self.period.duration();
+                self.tick(now, out);
                 self.step(now, world, out);
             }
         }

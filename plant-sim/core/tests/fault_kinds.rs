@@ -233,6 +233,55 @@ fn a_forged_frame_of_the_controller_stops_the_arm() {
     }
 }
 
+/// Ten a second, each behind what its sample has sent: by their own counters none is lost, and no command is later for them.
+#[test]
+fn drives_and_operator_give_signs_of_life() {
+    let (summary, record) = gate("payload:dropped@100s");
+    let length = record.truths.last().unwrap().plant.t;
+    for (info, node) in [
+        (&table::DRIVES_HEARTBEAT, Node::Drives),
+        (&table::OPERATOR_HEARTBEAT, Node::Operator),
+    ] {
+        let beats = record
+            .frames
+            .iter()
+            .filter(|(_, frame)| info.identifies(frame));
+        let beats: Vec<_> = beats
+            .map(|(_, frame)| codec::decode(frame).unwrap())
+            .collect();
+        assert!((beats.len() as f64 - length * 10.0).abs() <= 1.0, "{node}");
+        for (k, beat) in beats.iter().enumerate() {
+            assert_eq!(beat.counter, Some((k % 16) as u8), "{node}");
+        }
+    }
+    assert!(summary.completed, "{:?}", summary.error);
+}
+
+/// Nobody watches over the arm, and 250 ms after the last sign of life it stops, on its path. A shorter silence is none.
+#[test]
+fn a_silent_operator_stops_the_arm() {
+    let mut scenario = Scenario::built_in("gate").unwrap();
+    scenario.cycles = 3;
+    for fault in ["operator:silent@0.4s", "operatorheartbeat:loss@0.4s"] {
+        let (summary, record) = run_of(scenario.clone(), &[fault], 5);
+        assert!(!summary.completed && summary.at_rest, "{fault}");
+        assert_eq!(cause(&record), Cause::OperatorSilent, "{fault}");
+        let told = record.frames.iter().find_map(|(time, frame)| {
+            let emergency = table::CONTROLLER_EMERGENCY.identifies(frame);
+            emergency.then_some(time.seconds())
+        });
+        // The last one was sent at 350 ms and its sample's three fifths.
+        let late = told.unwrap() - 0.3506;
+        assert!((0.249..0.254).contains(&late), "{fault}: {late}");
+    }
+    let (summary, record) = run_of(scenario.clone(), &["operatorheartbeat:loss@0.4s..0.5s"], 5);
+    assert!(summary.completed, "{:?}", summary.error);
+    assert_eq!(cause(&record), Cause::None);
+    let (summary, record) = run_of(scenario, &["drivesheartbeat:loss@0.4s"], 5);
+    assert!(!summary.completed && summary.at_rest);
+    assert_eq!(cause(&record), Cause::PeerSilent);
+}
+
 /// The node's frames wait behind those that it sends without end; the drives let go as if it were silent.
 #[test]
 fn a_babbling_node_stops_the_arm() {

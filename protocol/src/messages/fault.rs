@@ -155,7 +155,10 @@ impl Fault {
             (Cause::SelfTest, _) => Unit::KnownAnswer,
             (Cause::DuplicateNode, _) => Unit::Identifier,
             (Cause::DriveFault, _) | (Cause::EncoderFault, None) => Unit::DriveStatus,
-            (Cause::FeedbackLost | Cause::PeerSilent | Cause::OverTorque, _) => Unit::Millisecond,
+            (
+                Cause::FeedbackLost | Cause::PeerSilent | Cause::OperatorSilent | Cause::OverTorque,
+                _,
+            ) => Unit::Millisecond,
             (Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => Unit::Frame,
             (Cause::FollowingError | Cause::SoftLimit | Cause::StuckSensor, None) => {
                 Unit::RadianOrMetre

@@ -231,6 +231,8 @@ codes! {
         SchemaMismatch = 18, "schema-mismatch";
         /// An encoder is not valid, jumps further than the axis can move, or moves against its torque, as with a wrong sign.
         EncoderFault = 19, "encoder-fault";
+        /// The operator's heartbeat was heard, and has stopped.
+        OperatorSilent = 20, "operator-silent";
     }
 }
 
@@ -245,7 +247,7 @@ impl Cause {
             Self::SchemaMismatch => 0x6300,
             Self::StuckSensor | Self::EncoderFault => 0x7300,
             Self::Babbling => 0x8110,
-            Self::PeerSilent => 0x8130,
+            Self::PeerSilent | Self::OperatorSilent => 0x8130,
             Self::BusOff => 0x8140,
             Self::DuplicateNode => 0x8150,
             Self::Reordered | Self::Corrupted | Self::BadValue => 0x8200,

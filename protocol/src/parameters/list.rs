@@ -98,6 +98,8 @@ parameters! {
         BadFrames = 0x0033, "bad-frames", "frames", Always, whole(1.0, 20.0, 3.0);
         /// Time in one move at a torque limit of an axis that hardly moves that stops the arm.
         SaturationTime = 0x0034, "saturation-time", "s", Always, real(0.02, 10.0, 0.2);
+        /// Time without a heartbeat after which a node whose heartbeat was heard counts as silent.
+        HeartbeatTimeout = 0x0035, "heartbeat-timeout", "s", Always, real(0.12, 5.0, 0.25);
     }
 }
 

@@ -44,6 +44,7 @@ impl Store for Controller {
             Parameter::SpeedFactor => &mut monitor.speed_factor,
             Parameter::BrakeDelay => &mut setup.brake_delay,
             Parameter::FeedbackTimeout => &mut setup.feedback_timeout,
+            Parameter::HeartbeatTimeout => &mut setup.heartbeat_timeout,
             Parameter::SaturationTime => &mut setup.saturation_time,
             Parameter::FeedbackGap => &mut monitor.gap,
             Parameter::FaultSamples => return Field::Whole(&mut monitor.samples),

@@ -267,7 +267,7 @@ impl Peer for Desk {
                 }
             }
             None => {
-                self.operator.next = now + self.operator.period.duration();
+                self.operator.tick(now, out);
                 if let Some(order) = self.orders.pop_front() {
                     // The controller treats an operator's first request as a possible replay.
                     let first = self.operator.sequence == 0;
