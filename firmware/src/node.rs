@@ -284,9 +284,9 @@ impl Node {
     fn motion(&mut self, motion: &Motion, verdict: Verdict) {
         let edge = matches!(
             motion.request,
-            MotionRequest::Enable | MotionRequest::FaultReset
+            MotionRequest::Enable | MotionRequest::FaultReset | MotionRequest::Hold
         );
-        // The first frame of an operator may be a replay: it must not switch anything on.
+        // The first frame of an operator may be a replay: it must not switch anything on, or let it move.
         if edge && verdict == Verdict::Initial {
             self.controller
                 .refuse(motion.sequence, Refusal::because(RefusalReason::WrongState));
@@ -356,6 +356,7 @@ impl Node {
             fault_value: fault.value,
             fault_limit: fault.limit,
             pace: (controller.pace() * 100.0 + 0.5) as u8,
+            operation: controller.operation(),
         }
     }
 

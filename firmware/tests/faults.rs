@@ -80,7 +80,7 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::StuckSensor => {
             "reference, or torque at its limit, against an encoder that does not move"
         }
-        Cause::OverSpeed => "speed of the encoder",
+        Cause::OverSpeed => "speed of the encoder; in manual operation of the tool",
         Cause::OverTorque => "a torque cut to its limit while the axis hardly moves",
         Cause::SoftLimit => "position against range",
         Cause::EStop => "emergency stop on the bus",

@@ -7,6 +7,7 @@
 //! There is one call, and it is total: every input gives an output. The work is bounded, nothing is allocated and no
 //! clock is read: time is counted in samples.
 
+mod manual;
 mod motion;
 mod parameters;
 mod requests;
@@ -16,7 +17,8 @@ mod transitions;
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
-    Cause, ControlWord, Fault, LimitFlags, Mode, MotionReply, MotionRequest, Outcome, Refusal,
+    Cause, ControlWord, Fault, LimitFlags, Mode, MotionReply, MotionRequest, Operation, Outcome,
+    Refusal,
 };
 use protocol::time::Period;
 use serde::{Deserialize, Serialize};
@@ -94,6 +96,12 @@ pub struct Controller {
     planning_steps: u8,
     /// Limits that have acted since this was last taken.
     limits: LimitFlags,
+    /// How the arm is operated.
+    operation: Operation,
+    /// Samples in a row in which the tool was too fast for manual operation.
+    too_fast: u8,
+    /// Samples for which moves are still held in it.
+    held: u16,
     /// First fault since the last reset.
     fault: Fault,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
@@ -134,6 +142,9 @@ impl Controller {
                 MAX_PLANNING_STEPS,
             ) as u8,
             limits: LimitFlags::EMPTY,
+            operation: Operation::Automatic,
+            held: 0,
+            too_fast: 0,
             fault: Fault::NONE,
             alarm: None,
             saturated: 0,
@@ -259,7 +270,7 @@ impl Controller {
     pub fn request(&mut self, sequence: u8, request: &MotionRequest) {
         match self.accept(sequence, request) {
             Ok(Answer::Now) => self.reply(sequence, Outcome::Accepted),
-            Ok(Answer::WhenPlanned) => {}
+            Ok(Answer::WhenPlanned | Answer::Never) => {}
             Err(refusal) => self.reply(sequence, Outcome::Refused(refusal)),
         }
     }
@@ -284,6 +295,7 @@ impl Controller {
             self.error = Vector4::zeros();
             self.excess = Vector4::zeros();
             self.saturated = 0;
+            self.let_go();
             return self.torque_off();
         }
         let period = self.config.period.seconds();
@@ -331,13 +343,16 @@ impl Controller {
         probe.end(Phase::Law);
         let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
         self.excess = limited.excess;
+        let qd = motion.qd;
         if limited.flags != LimitFlags::EMPTY {
             self.limits = self.limits | limited.flags;
-            let qd = motion.qd;
             self.ease(&torque, &qd);
             self.strain(readings, &qd);
         } else {
             self.stuck = 0;
+        }
+        if self.operation == Operation::Manual {
+            self.watch_tool(&task.actual.task_velocity(&qd));
         }
         probe.end(Phase::Limits);
         Actions {

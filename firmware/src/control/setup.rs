@@ -25,6 +25,8 @@ pub struct Setup {
     pub feedback_timeout: f32,
     /// Time without a heartbeat after which a node whose heartbeat was heard counts as silent, s.
     pub heartbeat_timeout: f32,
+    /// Time for which one hold lets moves go on in manual operation, s.
+    pub hold_time: f32,
     /// Time at a torque limit of an axis that hardly moves that stops the arm, s.
     pub saturation_time: f32,
     /// Rejected, stale or duplicate feedback frames in a row that stop the arm.
@@ -46,6 +48,7 @@ impl Setup {
             monitor: MonitorLimits::DEFAULT,
             feedback_timeout: const { Parameter::FeedbackTimeout.initial(1.0) },
             heartbeat_timeout: const { Parameter::HeartbeatTimeout.initial(1.0) },
+            hold_time: const { Parameter::HoldTime.initial(1.0) },
             saturation_time: const { Parameter::SaturationTime.initial(1.0) },
             bad_frames: const { Parameter::BadFrames.initial(1.0) as u32 },
         }

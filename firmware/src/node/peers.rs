@@ -14,8 +14,9 @@ use super::Node;
 #[derive(Clone, Debug)]
 pub(super) struct Pulse {
     receiver: Receiver,
-    /// Number of the newest sample at the newest heartbeat; `None` while it is not watched.
-    last: Option<u32>,
+    /// Number of the newest sample at the newest heartbeat.
+    last: u32,
+    is_watched: bool,
 }
 
 impl Pulse {
@@ -23,13 +24,14 @@ impl Pulse {
     pub(super) fn new() -> Self {
         Self {
             receiver: Receiver::new(Profile::Classical),
-            last: None,
+            last: 0,
+            is_watched: false,
         }
     }
 
     fn forget(&mut self) {
         self.receiver.reset();
-        self.last = None;
+        self.is_watched = false;
     }
 }
 
@@ -45,8 +47,10 @@ impl Node {
             Name::Controller => return,
         };
         let verdict = pulse.receiver.check(counter);
-        if verdict.is_new() {
-            pulse.last = newest;
+        if let Some(newest) = newest
+            && verdict.is_new()
+        {
+            (pulse.last, pulse.is_watched) = (newest, true);
         }
         self.accept(verdict);
     }
@@ -58,10 +62,10 @@ impl Node {
             (&mut self.drives, Cause::PeerSilent),
             (&mut self.operator, Cause::OperatorSilent),
         ] {
-            let Some(last) = pulse.last else {
+            if !pulse.is_watched {
                 continue;
-            };
-            let age = sample.wrapping_sub(last) as f32 * self.controller.period();
+            }
+            let age = sample.wrapping_sub(pulse.last) as f32 * self.controller.period();
             let timeout = self.controller.setup().heartbeat_timeout;
             if age > timeout {
                 pulse.forget();

@@ -54,6 +54,8 @@ pub struct MoveQueue {
     asked: f32,
     /// Pace at which the torque was found to suffice.
     found: f32,
+    /// In manual operation: whether somebody holds it.
+    held: Option<bool>,
     /// Where the last planned move ends: the next one starts there.
     plan_end: Vector4<f32>,
     completed: u8,
@@ -69,6 +71,7 @@ impl MoveQueue {
             clock: Clock::new(1.0),
             asked: 1.0,
             found: 1.0,
+            held: None,
             plan_end: Vector4::zeros(),
             completed: 0,
         }
@@ -107,7 +110,21 @@ impl MoveQueue {
 
     /// Share of its planned speed at which a move passes, once it has got there.
     pub fn pace(&self) -> f32 {
-        self.asked.min(self.found)
+        if self.held == Some(false) {
+            0.0
+        } else {
+            self.asked.min(self.found)
+        }
+    }
+
+    /// Whether somebody holds the motion: otherwise it pauses on its path. Moves planned from now on keep the tool slow. `None` in
+    /// automatic operation.
+    pub fn set_held(&mut self, held: Option<bool>) {
+        if held != self.held {
+            self.held = held;
+            self.planner.keep_tool_slow(held.is_some());
+            self.clock.set_pace(self.pace());
+        }
     }
 
     /// Share of its planned speed at which the move under way passes, or the next one will begin.
@@ -128,7 +145,7 @@ impl MoveQueue {
     /// Forgets the pace at which the torque was found to suffice: for another payload, say.
     pub fn try_full_pace(&mut self) {
         self.found = 1.0;
-        self.clock.set_pace(self.asked);
+        self.clock.set_pace(self.pace());
     }
 
     /// Slows down for want of torque, of which the move needs `excess` times as much as there is. `now` where that helps: an arm that
@@ -278,7 +295,7 @@ impl MoveQueue {
             qd: setpoint.ahead.qd,
             qdd: setpoint.ahead.qdd,
         };
-        let soon = stride.stopping || self.found < self.asked;
+        let soon = stride.stopping || self.found < self.asked || self.held == Some(false);
         let share = if soon { STOP_SHARE } else { RAMP_SHARE };
         let mut ramp = budget.ramp(&then, self.clock.time_scale(), share);
         if stride.stopping {

@@ -11,6 +11,7 @@
 mod bench;
 mod faults;
 mod gains;
+mod manual;
 mod pair;
 mod parameters;
 mod peers;

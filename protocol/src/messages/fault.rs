@@ -18,6 +18,8 @@ codes! {
         Lift = 3, "lift";
         /// Axis 4: turns the shaft.
         Wrist = 4, "wrist";
+        /// No axis, but the tool.
+        Tool = 5, "tool";
     }
 }
 
@@ -150,7 +152,7 @@ impl Fault {
     /// Unit of value and limit.
     #[must_use]
     pub const fn unit(&self) -> Unit {
-        use FaultAxis::{Lift, None};
+        use FaultAxis::{Lift, None, Tool};
         match (self.cause, self.axis) {
             (Cause::SelfTest, _) => Unit::KnownAnswer,
             (Cause::DuplicateNode, _) => Unit::Identifier,
@@ -171,7 +173,7 @@ impl Fault {
                 _ => Unit::Radian,
             },
             (Cause::OverSpeed, None) => Unit::SpeedOfAxis,
-            (Cause::OverSpeed, Lift) => Unit::MetrePerSecond,
+            (Cause::OverSpeed, Lift | Tool) => Unit::MetrePerSecond,
             (Cause::OverSpeed, _) => Unit::RadianPerSecond,
             (
                 Cause::None
@@ -192,8 +194,10 @@ impl fmt::Display for Fault {
         for c in self.cause.name().chars() {
             f.write_char(if c == '-' { ' ' } else { c })?;
         }
-        if self.axis != FaultAxis::None {
-            write!(f, ", axis {} ({})", self.axis.code(), self.axis)?;
+        match self.axis {
+            FaultAxis::None => {}
+            FaultAxis::Tool => write!(f, ", {}", self.axis)?,
+            axis => write!(f, ", axis {} ({axis})", axis.code())?,
         }
         let unit = self.unit();
         if unit != Unit::None && self.value != 0.0 {

@@ -100,6 +100,8 @@ parameters! {
         SaturationTime = 0x0034, "saturation-time", "s", Always, real(0.02, 10.0, 0.2);
         /// Time without a heartbeat after which a node whose heartbeat was heard counts as silent.
         HeartbeatTimeout = 0x0035, "heartbeat-timeout", "s", Always, real(0.12, 5.0, 0.25);
+        /// Time for which one hold lets moves go on in manual operation.
+        HoldTime = 0x0036, "hold-time", "s", AtRest, real(0.05, 0.5, 0.15);
     }
 }
 

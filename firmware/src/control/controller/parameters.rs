@@ -45,6 +45,7 @@ impl Store for Controller {
             Parameter::BrakeDelay => &mut setup.brake_delay,
             Parameter::FeedbackTimeout => &mut setup.feedback_timeout,
             Parameter::HeartbeatTimeout => &mut setup.heartbeat_timeout,
+            Parameter::HoldTime => &mut setup.hold_time,
             Parameter::SaturationTime => &mut setup.saturation_time,
             Parameter::FeedbackGap => &mut monitor.gap,
             Parameter::FaultSamples => return Field::Whole(&mut monitor.samples),

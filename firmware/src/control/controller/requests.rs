@@ -15,6 +15,7 @@ use crate::trajectory::request::{Request, Target};
 pub(super) enum Answer {
     Now,
     WhenPlanned,
+    Never,
 }
 
 impl Controller {
@@ -69,7 +70,12 @@ impl Controller {
                 self.queue.set_pace(*pace);
                 Answer::Now
             }
+            MotionRequest::Hold => self.hold()?,
             _ if !self.is_idle() => return Err(Refusal::because(RefusalReason::Moving)),
+            MotionRequest::SetOperation { operation } => {
+                self.operate_as(*operation);
+                Answer::Now
+            }
             MotionRequest::SetPayload { mass, com, inertia } => {
                 let payload = Payload {
                     mass: *mass,

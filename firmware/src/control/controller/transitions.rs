@@ -89,6 +89,7 @@ impl Controller {
         if let Some(fault) = self
             .monitor
             .check(readings, q, qd, &(error + moved), &self.error)
+            && !(fault.cause == Cause::SoftLimit && self.is_freed(q))
         {
             self.fail(fault);
         }
