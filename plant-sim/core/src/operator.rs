@@ -4,12 +4,13 @@
 
 mod desk;
 pub(crate) mod program;
+mod signs;
 
 use protocol::codec::{self, Encoder};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, EStop, EStopReason, Heartbeat, Hello, Message, Mode, Motion, MotionRequest, Node,
-    Outcome, ParameterReply, ParameterRequest, ResetReason, Server, State,
+    Cause, EStop, EStopReason, Hello, Message, Mode, MotionRequest, Node, Outcome, ParameterReply,
+    ParameterRequest, Server, State,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
@@ -19,6 +20,7 @@ use crate::peer::{Outbox, Peer, PeerError};
 use crate::scenario::Scenario;
 use crate::world::{CellEvent, OperatorError, Spot, World};
 use program::{Action, Program, Task};
+use signs::Button;
 
 pub use desk::{Answer, Desk, Order};
 
@@ -57,6 +59,8 @@ pub struct Operator {
     period: Period,
     next: Instant,
     heart: Heart,
+    /// The button of manual operation.
+    button: Button,
     given_up: bool,
     encoder: Encoder,
     sequence: u8,
@@ -88,6 +92,7 @@ impl Operator {
             period: Period::of_rate(scenario.rate_hz),
             next: Instant::ORIGIN,
             heart: Heart::new(FIRST_HEARTBEAT, Period::of_rate(scenario.rate_hz)),
+            button: Button::default(),
             given_up: false,
             encoder: Encoder::default(),
             sequence: 0,
@@ -129,19 +134,6 @@ impl Operator {
         }
     }
 
-    /// What every poll begins with.
-    fn tick(&mut self, now: Instant, out: &mut Outbox) {
-        self.next = now + self.period.duration();
-        let heartbeat = Heartbeat {
-            state: Mode::Ready,
-            cause: Cause::None,
-            reset: ResetReason::PowerOn,
-        };
-        let encoder = &mut self.encoder;
-        self.heart
-            .beat(now, (Node::Operator, heartbeat), encoder, out);
-    }
-
     /// One poll: evaluates what has arrived and acts on it.
     fn step(&mut self, now: Instant, world: &mut World, out: &mut Outbox) {
         match self.work(now, world, out) {
@@ -163,6 +155,7 @@ impl Operator {
     }
 
     fn stop_working<const N: usize>(&mut self, last: [Action; N]) {
+        self.button.press(false);
         self.program.only(last);
         self.current = self.program.next();
         self.progress = Progress::Due;
@@ -254,20 +247,13 @@ impl Operator {
                 reason: EStopReason::BUTTON,
                 counter: 0,
             }),
+            Action::Hold(pressed) => {
+                self.button.press(*pressed);
+                return None;
+            }
             _ => return None,
         };
         // A value that no frame can carry is not sent; the error of the missing reply then names the request.
-        self.encoder.encode(&message).ok()
-    }
-
-    /// A request whose answer the program does not wait for.
-    fn send(&mut self, request: MotionRequest) -> Option<CanFrame> {
-        if let MotionRequest::SetOverride { pace } = request {
-            self.pace = pace;
-        }
-        self.sequence = self.sequence.wrapping_add(1);
-        let sequence = self.sequence;
-        let message = Message::Motion(Motion { sequence, request });
         self.encoder.encode(&message).ok()
     }
 
@@ -339,7 +325,7 @@ impl Operator {
                 (arrived, limit)
             }
             Action::Dwell(time) => (waited >= *time, Duration::MAX),
-            Action::EmergencyStop | Action::Cell(_) => (true, Duration::MAX),
+            Action::EmergencyStop | Action::Hold(_) | Action::Cell(_) => (true, Duration::MAX),
         };
         if complete || waited <= limit {
             return Ok(complete);
@@ -370,7 +356,9 @@ impl Operator {
             }
             Action::WaitMode(mode) => format!("state {mode}"),
             Action::WaitArrived => "end of the move".into(),
-            Action::EmergencyStop | Action::Dwell(_) | Action::Cell(_) => "end of a dwell".into(),
+            Action::EmergencyStop | Action::Hold(_) | Action::Dwell(_) | Action::Cell(_) => {
+                "end of a dwell".into()
+            }
         }
     }
 }

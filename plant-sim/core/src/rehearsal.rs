@@ -158,6 +158,8 @@ struct Stage {
     before: Vector4<f32>,
     samples: u64,
     sequence: u8,
+    /// Whether the operator holds moves, in manual operation.
+    holds: bool,
     moves: Vec<Move>,
     /// Numbers of the moves, from the one under way on.
     under_way: VecDeque<(u8, usize)>,
@@ -180,6 +182,7 @@ impl Stage {
             before: start,
             samples: 0,
             sequence: 0,
+            holds: false,
             moves: Vec::new(),
             under_way: VecDeque::new(),
             torque: [0.0; 4],
@@ -215,6 +218,10 @@ impl Stage {
             Action::Dwell(time) => {
                 let samples = (time.seconds() / f64::from(self.period)).ceil() as u64;
                 (0..samples).try_for_each(|_| self.sample())
+            }
+            Action::Hold(pressed) => {
+                self.holds = *pressed;
+                Ok(())
             }
             Action::Hello | Action::EmergencyStop | Action::Cell(_) => Ok(()),
         }
@@ -281,6 +288,10 @@ impl Stage {
 
     /// One sample, at which the arm is where the reference of the last one leads.
     fn sample(&mut self) -> Result<(), OperatorError> {
+        if self.holds && matches!(self.controller.mode(), Mode::Enabled | Mode::Moving) {
+            // Accepted, it is not answered.
+            self.controller.request(0, &MotionRequest::Hold);
+        }
         // The command acts later than in the middle of the sample, whose speed is the mean.
         let Rates { qd, qdd } = *self.controller.ahead();
         let mean = qd - qdd * self.controller.setup().command_delay;

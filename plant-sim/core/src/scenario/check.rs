@@ -10,7 +10,7 @@ use protocol::time::Duration;
 use toml::de::{DeTable, DeValue};
 
 use super::{
-    GainsSpec, Joints, Jump, Line, MAX_CYCLES, Override, PayloadSpec, Place, Scenario,
+    GainsSpec, Joints, Jump, Line, MAX_CYCLES, Override, PayloadSpec, Place, Release, Scenario,
     ScenarioError, Step, check_rate,
 };
 use crate::allowed::schema::Each;
@@ -90,6 +90,14 @@ impl Scenario {
                     findings.held(held.take());
                 }
                 Step::Stop(_) | Step::Estop(_) => held = None,
+                Step::Release(Release { after, .. }) if self.operation.is_automatic() => {
+                    findings.wrong(
+                        &format!("{key}.release.after"),
+                        after,
+                        "with operation = \"manual\", in which moves are held",
+                    );
+                }
+                Step::Release(_) => {}
                 Step::Jump(_) | Step::Line(_) | Step::Joints(_) => {}
             }
         }
@@ -257,6 +265,10 @@ impl<'a> Findings<'a> {
             Step::Override(Override { after, to }) => {
                 self.number(&format!("{key}.override.after"), *after, SECONDS);
                 self.number(&format!("{key}.override.to"), *to, PACE);
+            }
+            Step::Release(Release { after, lasts }) => {
+                self.number(&format!("{key}.release.after"), *after, SECONDS);
+                self.number(&format!("{key}.release.for"), *lasts, SECONDS);
             }
             Step::Estop(seconds) => self.number(&format!("{key}.estop"), *seconds, SECONDS),
             Step::Pick(payload) => {
