@@ -310,7 +310,7 @@ fn a_stop_ends_a_held_move() {
     assert_eq!((bench.mode(), here(&bench)), (Mode::Enabled, rest));
 }
 
-/// 0.51 rad/s with 0.51 m from the base: 260 mm/s, for three samples.
+/// 260 mm/s of the lift, for three samples.
 #[test]
 fn a_tool_that_is_too_fast_is_a_fault() {
     for (operation, expected) in [
@@ -319,8 +319,6 @@ fn a_tool_that_is_too_fast_is_a_fault() {
     ] {
         let mut bench = Bench::enabled();
         bench.request(set(operation));
-        let radius = f64::from(points(&here(&bench))[0][0]).hypot(points(&here(&bench))[0][1]);
-        assert!((0.3..1.1).contains(&radius));
         // Motor of the lift at 25 mm a turn: 0.26 m/s, far from its own limit.
         bench.velocity[2] = (0.26 / 0.025 * std::f64::consts::TAU) as f32;
         bench.run(2);
