@@ -5,11 +5,12 @@
 //! only ages the feedback. So lock-step, a virtual bus in real time and a real bus all run the same code path.
 
 mod parameters;
+mod peers;
 mod report;
 
 use nalgebra::Vector4;
 use protocol::bus::Transmit;
-use protocol::codec::{self, DecodeError, Encoder};
+use protocol::codec::{self, Encoder};
 use protocol::counters::Counters;
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::frame::CanFrame;
@@ -17,7 +18,6 @@ use protocol::messages::{
     Cause, Command, DriveStatus, Fault, Feedback, Message, Mode, Motion, MotionRequest, NmtCommand,
     Node as Name, ParameterReply, Refusal, RefusalReason, ResetReason, Server,
 };
-use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use crate::control::controller::{Config, Controller};
@@ -26,10 +26,11 @@ use crate::control::phase::{Phase, Probe};
 use crate::control::readings::Readings;
 use crate::control::self_test;
 use crate::control::states::Event;
+use peers::Pulse;
 
 /// Default age of the feedback at which the drives count as silent: torque off, brake.
 pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
-/// Planning pauses every tenth sample, for the heat of the motors, and so that no report waits longer: half the period of the state at 1 kHz, for a
+/// Planning pauses every tenth sample, for what need not be looked at more often, and so that no report waits longer: half the period of the state at 1 kHz, for a
 /// tenth of the planning. Counted in samples and not in time, so that the same feedback gives the same torques.
 const REPORT_SAMPLES: u32 = 10;
 /// Answers that may wait for such a sample; with more, reports are sent in spite of planning. Two leave room in the
@@ -44,6 +45,8 @@ pub struct Node {
     motion: Receiver,
     parameter: Receiver,
     drives_parameter: Receiver,
+    drives: Pulse,
+    operator: Pulse,
     encoder: Encoder,
     received: Counters,
     unsent: u16,
@@ -74,6 +77,8 @@ impl Node {
             motion: Receiver::new(Profile::Fd),
             parameter: Receiver::new(Profile::Fd),
             drives_parameter: Receiver::new(Profile::Fd),
+            drives: Pulse::new(),
+            operator: Pulse::new(),
             encoder: Encoder::default(),
             received: Counters::default(),
             unsent: 0,
@@ -212,8 +217,16 @@ impl Node {
                 let for_us = nmt.node == 0 || nmt.node == Name::Controller.code();
                 self.reset_asked |= for_us && nmt.command == NmtCommand::ResetNode;
             }
-            // Messages between other nodes, or to the operator.
-            _ => {}
+            Message::Command(_)
+            | Message::State(_)
+            | Message::MotionReply(_)
+            | Message::ParameterRequest(Server::Drives, _)
+            | Message::ParameterReply(Server::Controller, _)
+            | Message::Emergency(Name::Controller, _)
+            | Message::Heartbeat(Name::Controller, _) => self.meet(message),
+            // Messages between other nodes.
+            Message::Heartbeat(name, _) => self.hear(*name, counter),
+            Message::Emergency(..) => {}
         }
         false
     }
@@ -275,6 +288,7 @@ impl Node {
         // feedback gives the same torques whenever it arrives.
         self.samples = self.samples.wrapping_add(1);
         let planned = if self.samples.is_multiple_of(REPORT_SAMPLES) {
+            self.listen(feedback.sample);
             self.controller.tend();
             false
         } else {
@@ -287,9 +301,9 @@ impl Node {
     fn motion(&mut self, motion: &Motion, verdict: Verdict) {
         let edge = matches!(
             motion.request,
-            MotionRequest::Enable | MotionRequest::FaultReset
+            MotionRequest::Enable | MotionRequest::FaultReset | MotionRequest::Hold
         );
-        // The first frame of an operator may be a replay: it must not switch anything on.
+        // The first frame of an operator may be a replay: it must not switch anything on, or let it move.
         if edge && verdict == Verdict::Initial {
             self.controller
                 .refuse(motion.sequence, Refusal::because(RefusalReason::WrongState));
@@ -307,46 +321,6 @@ impl Node {
     fn accept(&mut self, verdict: Verdict) -> bool {
         self.received.count(verdict);
         !matches!(verdict, Verdict::Duplicate | Verdict::Stale(_))
-    }
-
-    fn reject(&mut self, error: DecodeError, frame: &CanFrame) {
-        self.received.refuse(&error);
-        if table::FEEDBACK.identifies(frame) {
-            self.suspect(match error {
-                DecodeError::Value(_) | DecodeError::Malformed | DecodeError::NotCanonical => {
-                    Cause::BadValue
-                }
-                _ => Cause::Corrupted,
-            });
-        }
-    }
-
-    /// Counts bad feedback frames; several in a row stop the arm.
-    fn suspect(&mut self, cause: Cause) {
-        self.bad_feedback = self.bad_feedback.saturating_add(1);
-        if u32::from(self.bad_feedback) >= self.controller.setup().bad_frames {
-            let frames = f32::from(self.bad_feedback);
-            self.bad_feedback = 0;
-            self.controller.fail(Fault::value(cause, frames, 0.0));
-        }
-    }
-
-    /// Checks the age of the feedback.
-    fn guard(&mut self, now: Instant) {
-        let Some((_, arrived)) = self.newest else {
-            return;
-        };
-        let age = now.since(arrived);
-        let timeout = self.controller.setup().feedback_timeout;
-        if age > Duration::from_micros(u64::from((timeout * 1e6) as u32)) {
-            let age_ms = age.nanos() as f32 * 1e-6;
-            self.controller
-                .fail(Fault::value(Cause::PeerSilent, age_ms, timeout * 1e3));
-            self.newest = None;
-            self.feedback.reset();
-            self.drives_parameter.reset();
-            self.same_schema = false;
-        }
     }
 
     fn send<B: Transmit>(&mut self, message: &Message, bus: &mut B) {

@@ -15,6 +15,7 @@ pub mod planner;
 pub mod profile;
 pub mod queue;
 pub mod request;
+pub mod tool_speed;
 pub mod torque_budget;
 
 use nalgebra::Vector4;

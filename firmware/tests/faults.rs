@@ -22,8 +22,10 @@ const ORACLE: &str = "
 self-test       at once      nothing        nothing        nothing        restart
 feedback-lost   5 ms         stop           brake          nothing        reset
 peer-silent     100 ms       off            off            off            reset
+operator-silent 250 ms       stop           nothing        nothing        reset
 reordered       3 frames     stop           brake          nothing        reset
 corrupted       3 frames     stop           brake          nothing        reset
+duplicate-node  at once      stop           nothing        nothing        reset
 bad-value       3 frames     off            off            off            reset
 following-error each axis    stop           brake          off            reset
 stuck-sensor    each axis    off            off            off            reset
@@ -70,15 +72,19 @@ fn seen_by(cause: Cause) -> &'static str {
     match cause {
         Cause::SelfTest => "known answers of mathematics, kinematics and CRC; ranges of the model",
         Cause::FeedbackLost => "sample number of the next feedback",
-        Cause::PeerSilent => "age of the feedback",
+        Cause::PeerSilent => {
+            "age of the feedback; of the heartbeat of the drives, as of the operator's"
+        }
+        Cause::OperatorSilent => "age of the operator's heartbeat, once one was heard",
         Cause::Reordered => "counter of the feedback: repeated or old",
         Cause::Corrupted => "format, length or CRC of the feedback",
+        Cause::DuplicateNode => "frame that only the controller sends",
         Cause::BadValue => "value in the feedback; once in a torque of the law",
         Cause::FollowingError => "reference against encoder",
         Cause::StuckSensor => {
             "reference, or torque at its limit, against an encoder that does not move"
         }
-        Cause::OverSpeed => "speed of the encoder",
+        Cause::OverSpeed => "speed of the encoder; in manual operation of the tool",
         Cause::OverTorque => "a torque cut to its limit while the axis hardly moves",
         Cause::SoftLimit => "position against range",
         Cause::EStop => "emergency stop on the bus",

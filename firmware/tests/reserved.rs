@@ -16,8 +16,7 @@ use std::path::Path;
 
 use protocol::messages::{Cause, ParameterError, RefusalReason};
 
-const CAUSES: [Cause; 5] = [
-    Cause::DuplicateNode,
+const CAUSES: [Cause; 4] = [
     Cause::Babbling,
     Cause::BusOff,
     Cause::Overrun,
@@ -169,7 +168,7 @@ fn messages_of_drives_and_operator() {
         code(&folder.with_extension("rs"), &mut text);
         code(&folder, &mut text);
         for (kind, sent) in [
-            ("Heartbeat", text.contains("encode(&Message::Heartbeat")),
+            ("Heartbeat", text.contains("Heartbeat {")),
             ("Emergency", text.contains("encode(&Message::Emergency")),
         ] {
             let reserved = format!("/// {kind} of the {node}. Reserved: not sent yet.");

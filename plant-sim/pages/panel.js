@@ -1,5 +1,8 @@
 // What a person can ask for: drawn from what the server offers, and nothing else.
 
+/** Time between two holds of a button that is pressed; the controller goes on for 150 ms after each. */
+const HOLD_MS = 50;
+
 class Panel {
     /** @param onAnswer is called with a sentence when the server does not take what was asked for, and with nothing when it does */
     constructor(offers, onAnswer) {
@@ -23,11 +26,41 @@ class Panel {
     }
 
     /** A button; those that are urgent have a place of their own. */
-    button({ label, ask: name, takes, with: fixed, urgent }) {
+    button({ label, ask: name, takes, with: fixed, urgent, held }) {
         const press = async () => this.onAnswer(await ask({ [name]: { ...fixed, ...Object.fromEntries(takes.map((key) => [key, this.values.get(key)()])) } }));
-        const button = element("button", { type: "button", disabled: "", class: urgent ? `urgent ${name}` : null, click: press }, label);
+        const button = element("button", { type: "button", disabled: "", class: urgent ? `urgent ${name}` : null, ...(held ? {} : { click: press }) }, label);
+        if (held) {
+            this.hold(button, press);
+        }
         (urgent ? this.urgent : this.buttons).push(button);
         return urgent ? null : button;
+    }
+
+    /** What is asked for goes on as long as the button is pressed, by pointer or key: it is held again and again, and then stopped. */
+    hold(button, press) {
+        let pressed = false;
+        let going = false;
+        const begin = async () => {
+            if (going || button.disabled) {
+                return;
+            }
+            going = pressed = true;
+            await press();
+            while (pressed) {
+                ask({ hold: {} });
+                await new Promise((later) => setTimeout(later, HOLD_MS));
+            }
+            await ask({ stop: {} });
+            going = false;
+        };
+        const end = () => (pressed = false);
+        const isPress = ({ key }) => key === "Enter" || key === " ";
+        button.addEventListener("pointerdown", (event) => event.button === 0 && begin());
+        button.addEventListener("keydown", (event) => isPress(event) && !event.repeat && begin());
+        button.addEventListener("keyup", (event) => isPress(event) && end());
+        ["pointerup", "pointerleave", "pointercancel", "blur"].forEach((name) => button.addEventListener(name, end));
+        addEventListener("blur", end);
+        document.addEventListener("visibilitychange", end);
     }
 
     field(field) {

@@ -13,7 +13,7 @@ use protocol::codec;
 use protocol::frame::{CanFrame, StandardId};
 use protocol::messages::{
     Cause, Compensation, DriveStatus, Emergency, FaultAxis, Feedback, Law, LimitFlags, Message,
-    Mode, Node, State,
+    Mode, Node, Operation, State,
 };
 use protocol::wire::BitTiming;
 use ratatui::Terminal;
@@ -58,6 +58,7 @@ fn state(mode: Mode, cause: Cause) -> CanFrame {
         fault_value: 2.5,
         fault_limit: 2.42,
         pace: 100,
+        operation: Operation::Automatic,
     };
     codec::encode(&Message::State(state), 0).unwrap()
 }

@@ -179,7 +179,9 @@ pub fn decode(frame: &CanFrame) -> Result<Received, DecodeError> {
     Ok(Received { message, counter })
 }
 
-const fn info_of(message: &Message) -> &'static MessageInfo {
+/// The row of the table for this message.
+#[must_use]
+pub const fn info_of(message: &Message) -> &'static MessageInfo {
     match message {
         Message::Nmt(_) => &table::NMT,
         Message::EStop(_) => &table::ESTOP,

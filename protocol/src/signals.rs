@@ -2,8 +2,8 @@
 
 use crate::messages::{
     Cause, Compensation, ControlWord, DriveStatus, ElbowSide, FaultAxis, Law, LimitFlags, Mode,
-    MotionRequest, NmtCommand, Outcome, ParameterError, ParameterReply, ParameterRequest,
-    RefusalReason, ResetReason, WristTurn,
+    MotionRequest, NmtCommand, Operation, Outcome, ParameterError, ParameterReply,
+    ParameterRequest, RefusalReason, ResetReason, WristTurn,
 };
 use crate::schema::{Kind, Signal};
 
@@ -43,6 +43,7 @@ const FRACTION: Kind = range(0.0, 1.0);
 const CAUSE: Kind = Kind::Code(Cause::CODES);
 const ELBOW: Kind = Kind::Code(ElbowSide::CODES);
 const TURN: Kind = Kind::Code(WristTurn::CODES);
+const OPERATION: Kind = Kind::Code(Operation::CODES);
 const MODE: Kind = Kind::Code(Mode::CODES);
 
 const fn range(min: f32, max: f32) -> Kind {
@@ -157,6 +158,7 @@ pub(crate) const MOTION: &[Signal] = &[
     when(9, "damping", 6, range(0.0, 10.0), one!("")),
     when(9, "observer", 10, range(0.0, 1000.0), one!("rad/s")),
     when(10, "override_pace", 2, FRACTION, one!("")),
+    when(11, "operation", 2, OPERATION, one!("")),
 ];
 
 /// Report of the controller.
@@ -182,6 +184,7 @@ pub(crate) const STATE: &[Signal] = &[
     signal("fault_value", 33, ANY, one!("")),
     signal("fault_limit", 37, ANY, one!("")),
     signal("pace", 41, Kind::U8, one!("%")),
+    signal("operation", 42, OPERATION, one!("")),
 ];
 
 /// Answer to a request.

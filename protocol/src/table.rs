@@ -188,12 +188,12 @@ const fn request_of(name: &'static str, server: Server, client: Node) -> Message
     }
 }
 
-/// Heartbeat of the drives. Reserved: not sent yet.
+/// Heartbeat of the drives.
 pub static DRIVES_HEARTBEAT: MessageInfo = heartbeat_of("DrivesHeartbeat", Node::Drives);
 /// Heartbeat of the controller.
 pub static CONTROLLER_HEARTBEAT: MessageInfo =
     heartbeat_of("ControllerHeartbeat", Node::Controller);
-/// Heartbeat of the operator. Reserved: not sent yet.
+/// Heartbeat of the operator.
 pub static OPERATOR_HEARTBEAT: MessageInfo = heartbeat_of("OperatorHeartbeat", Node::Operator);
 
 const fn heartbeat_of(name: &'static str, node: Node) -> MessageInfo {

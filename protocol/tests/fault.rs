@@ -19,7 +19,7 @@ fn a_fault_reads_as_a_sentence_with_axis_and_unit() {
         value,
         limit,
     };
-    use FaultAxis::{Elbow, Lift, Shoulder, Wrist};
+    use FaultAxis::{Elbow, Lift, Shoulder, Tool, Wrist};
     let status = DriveStatus::READY | DriveStatus::FAULT;
     for (fault, sentence) in [
         (
@@ -37,6 +37,10 @@ fn a_fault_reads_as_a_sentence_with_axis_and_unit() {
         (
             of_axis(Cause::OverSpeed, Lift, -2.5, 2.42),
             "over speed, axis 3 (lift): -2.50 m/s, limit 2.42 m/s",
+        ),
+        (
+            of_axis(Cause::OverSpeed, Tool, 0.262, 0.25),
+            "over speed, tool: 0.26 m/s, limit 0.25 m/s",
         ),
         (
             of_axis(Cause::SoftLimit, Wrist, 7.1, 7.0313),

@@ -149,6 +149,10 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                 MotionRequest::SetOverride { pace } => {
                     vec![one("request", 10), one("override_pace", pace)]
                 }
+                MotionRequest::SetOperation { operation } => {
+                    vec![one("request", 11), one("operation", operation.code())]
+                }
+                MotionRequest::Hold => vec![one("request", 12)],
             });
             values
         }
@@ -168,6 +172,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
             one("fault_value", m.fault_value),
             one("fault_limit", m.fault_limit),
             one("pace", m.pace),
+            one("operation", m.operation.code()),
         ],
         Message::MotionReply(m) => match m.outcome {
             Outcome::Accepted => vec![one("sequence", m.sequence), one("outcome", 0)],

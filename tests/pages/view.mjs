@@ -103,6 +103,19 @@ async function everyButtonActs(page) {
         });
         check(Math.max(...changed) > 50, `a jog of the ${axis} changes ${changed} pixels`);
     }
+    // By hand: as long as the button is pressed, and not in automatic operation.
+    await happens(page, "jog: moves are held in manual operation alone", () => press(page, "shoulder ▶"));
+    await acceptedBy(page, "manual operation", "set-operation");
+    for (const [name, at] of [["shoulder ◀", 0], ["lift ▶", 1]]) {
+        const changed = await moves(page, async () => {
+            await page.getByRole("button", { name, exact: true }).hover();
+            await happens(page, "move-joint: accepted", () => page.mouse.down());
+            await page.waitForTimeout(700);
+            await happens(page, "stop: accepted", () => page.mouse.up());
+        });
+        check(changed[at] > 50, `${name} held changes ${changed} pixels`);
+    }
+    await acceptedBy(page, "automatic operation", "set-operation");
     await page.getByLabel("Payload", { exact: true }).fill("5");
     await acceptedBy(page, "Carry", "set-payload");
     await page.getByLabel("Control law").selectOption("pd-gravity");

@@ -19,18 +19,15 @@ pub struct Chatter {
     /// Torques of the last three samples, in turn.
     torques: [Vector4<f32>; 3],
     oldest: u8,
-    /// Samples since the start, up to three.
-    kept: u8,
     mean: f32,
 }
 
 impl Chatter {
-    /// A watch that has seen nothing.
+    /// A watch that has seen nothing. That torques begin counts as one swing.
     pub fn new() -> Self {
         Self {
             torques: [Vector4::zeros(); 3],
             oldest: 0,
-            kept: 0,
             mean: 0.0,
         }
     }
@@ -41,15 +38,11 @@ impl Chatter {
             *place = *torque;
         }
         self.oldest = if self.oldest < 2 { self.oldest + 1 } else { 0 };
-        self.kept = self.kept.saturating_add(1);
     }
 
     /// Looks at the last three samples, `period` seconds apart. Returns the axis that swings most and the mean swing of all (%) if that is too
     /// much.
     pub fn look(&mut self, limit: &Vector4<f32>, period: f32) -> Option<(Axis, f32)> {
-        if self.kept < 3 {
-            return None;
-        }
         let [a, b, c] = self.torques;
         let middle = match self.oldest {
             0 => b,
@@ -57,7 +50,8 @@ impl Chatter {
             _ => a,
         };
         let swings = (a + b + c - middle * 3.0).abs().component_div(limit);
-        self.mean += (swings.sum() - self.mean) / LOOKS;
+        // One great swing, as where a reading jumps, is not chatter yet.
+        self.mean += (swings.sum().min(1.0) - self.mean) / LOOKS;
         let percent = self.mean * 100.0 * (SHORT / period).min(1.0);
         if percent <= f32::from(CHATTER_PERCENT) {
             return None;

@@ -7,8 +7,10 @@
 //! There is one call, and it is total: every input gives an output. The work is bounded, nothing is allocated and no
 //! clock is read: time is counted in samples.
 
+mod manual;
 mod motion;
 mod parameters;
+mod reports;
 mod requests;
 mod strain;
 mod transitions;
@@ -16,14 +18,15 @@ mod transitions;
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
-    Cause, ControlWord, Fault, LimitFlags, Mode, MotionReply, MotionRequest, Outcome, Refusal,
+    Cause, ControlWord, Fault, LimitFlags, MotionReply, MotionRequest, Operation, Outcome, Refusal,
 };
 use protocol::time::Period;
 use serde::{Deserialize, Serialize};
 
 use crate::control::chatter::Chatter;
 use crate::control::heat::Heat;
-use crate::control::laws::{ControlInput, Memory, Model, Motion, Selection, Task};
+use crate::control::laws::observer::MomentumObserver;
+use crate::control::laws::{ControlInput, Memory, Model, Motion, Task};
 use crate::control::limits;
 use crate::control::monitor::Monitor;
 use crate::control::phase::{Phase, Probe};
@@ -35,7 +38,7 @@ use crate::mechanics::body::Body;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::clamp;
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
-use crate::trajectory::{Rates, Reference, Setpoint};
+use crate::trajectory::{Reference, Setpoint};
 use requests::Answer;
 
 /// Planning steps per millisecond of the sampling period.
@@ -96,6 +99,12 @@ pub struct Controller {
     planning_steps: u8,
     /// Limits that have acted since this was last taken.
     limits: LimitFlags,
+    /// How the arm is operated.
+    operation: Operation,
+    /// Samples in a row in which the tool was too fast for manual operation.
+    too_fast: u8,
+    /// Samples for which moves are still held in it.
+    held: u16,
     /// First fault since the last reset.
     fault: Fault,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
@@ -107,6 +116,7 @@ pub struct Controller {
     /// What the last sample followed, as handed to the law.
     setpoint: Setpoint,
     memory: Memory,
+    observer: MomentumObserver,
     monitor: Monitor,
     heat: Heat,
     chatter: Chatter,
@@ -139,6 +149,9 @@ impl Controller {
                 MAX_PLANNING_STEPS,
             ) as u8,
             limits: LimitFlags::EMPTY,
+            operation: Operation::Automatic,
+            held: 0,
+            too_fast: 0,
             fault: Fault::NONE,
             alarm: None,
             saturated: 0,
@@ -146,6 +159,7 @@ impl Controller {
             queue: MoveQueue::new(),
             setpoint: Setpoint::rest(Vector4::zeros()),
             memory: Memory::new(),
+            observer: MomentumObserver::new(),
             monitor: Monitor::new(&config.arm, &config.setup.monitor, config.period.seconds()),
             heat: Heat::new(),
             chatter: Chatter::new(),
@@ -154,116 +168,6 @@ impl Controller {
             replies: Deque::new(),
             unanswered: 0,
         }
-    }
-
-    /// State of the cabinet.
-    pub fn state(&self) -> State {
-        self.state
-    }
-
-    /// State of the cabinet as it is reported.
-    pub fn mode(&self) -> Mode {
-        self.state.mode()
-    }
-
-    /// The first fault since the last reset, or [`Fault::NONE`].
-    pub fn fault(&self) -> &Fault {
-        &self.fault
-    }
-
-    /// Cause of the first fault since the last reset.
-    pub fn cause(&self) -> Cause {
-        self.fault.cause
-    }
-
-    /// A fault not reported to the peers yet; each is returned once.
-    pub fn take_alarm(&mut self) -> Option<Fault> {
-        self.alarm.take()
-    }
-
-    /// The robot.
-    pub fn arm(&self) -> &ArmModel {
-        &self.config.arm
-    }
-
-    /// Law, compensation and gains in use.
-    pub fn selection(&self) -> &Selection {
-        &self.setup.selection
-    }
-
-    /// What can be changed while the controller runs.
-    pub fn setup(&self) -> &Setup {
-        &self.setup
-    }
-
-    /// Reference of the last sample.
-    pub fn reference(&self) -> &Reference {
-        &self.setpoint.reference
-    }
-
-    /// How the arm is meant to move when the command of the last sample acts.
-    pub fn ahead(&self) -> &Rates {
-        &self.setpoint.ahead
-    }
-
-    /// Reference minus measured position of the last sample.
-    pub fn following_error(&self) -> &Vector4<f32> {
-        &self.error
-    }
-
-    /// Efforts of the last sample that the model does not explain: N m, N m, N, N m.
-    pub fn disturbance(&self) -> &Vector4<f32> {
-        self.memory.disturbance()
-    }
-
-    /// Heat of each motor: 1 is what it may have for ever.
-    pub fn heat(&self) -> &Vector4<f32> {
-        self.heat.shares()
-    }
-
-    /// Every limit that has acted since the last call.
-    pub fn take_limits(&mut self) -> LimitFlags {
-        core::mem::take(&mut self.limits)
-    }
-
-    /// Moves planned or waiting.
-    pub fn queued(&self) -> u8 {
-        self.queue.len()
-    }
-
-    /// Whether a move is being planned, which makes a sample expensive.
-    pub fn is_planning(&self) -> bool {
-        self.queue.is_planning()
-    }
-
-    /// Share of its planned speed at which a move passes or would pass now.
-    pub fn pace(&self) -> f32 {
-        self.queue.pace_now()
-    }
-
-    /// Number of the move under way, or about to begin.
-    pub fn under_way(&self) -> Option<u8> {
-        self.queue.under_way()
-    }
-
-    /// Number of the last move that was completed.
-    pub fn completed(&self) -> u8 {
-        self.queue.completed()
-    }
-
-    /// Number of replies to send.
-    pub fn answers_waiting(&self) -> usize {
-        self.replies.len()
-    }
-
-    /// Requests that were never answered, because too many replies were waiting.
-    pub fn unanswered(&self) -> u16 {
-        self.unanswered
-    }
-
-    /// The next reply to send to an operator.
-    pub fn take_reply(&mut self) -> Option<MotionReply> {
-        self.replies.pop_front()
     }
 
     /// Refuses a request without examining it further.
@@ -276,7 +180,7 @@ impl Controller {
     pub fn request(&mut self, sequence: u8, request: &MotionRequest) {
         match self.accept(sequence, request) {
             Ok(Answer::Now) => self.reply(sequence, Outcome::Accepted),
-            Ok(Answer::WhenPlanned) => {}
+            Ok(Answer::WhenPlanned | Answer::Never) => {}
             Err(refusal) => self.reply(sequence, Outcome::Refused(refusal)),
         }
     }
@@ -303,12 +207,17 @@ impl Controller {
             self.excess = Vector4::zeros();
             self.saturated = 0;
             self.chatter = Chatter::new();
+            self.let_go();
             return self.torque_off();
         }
         let period = self.config.period.seconds();
         let lead = self.setup.command_delay + 0.5 * period;
         let before = self.setpoint.reference;
         self.advance(readings.steps.min(self.max_gap), lead);
+        if self.state.is_braking() || readings.steps > self.max_gap {
+            // The brake holds: the load it carries must not be mistaken for a disturbance. Nor what has not been seen.
+            self.unlearn();
+        }
         let Setpoint { reference, ahead } = &self.setpoint;
         self.error = reference.q - q;
 
@@ -331,43 +240,48 @@ impl Controller {
         probe.end(Phase::Kinematics);
         let model = Model::new(&self.body, &trig, &motion);
         probe.end(Phase::Dynamics);
-        if self.state.is_braking() || readings.steps > self.max_gap {
-            // The brake holds: the load it carries must not be mistaken for a disturbance. Nor what has not been seen.
-            self.memory = Memory::new();
-        }
         let corner = self.setup.selection.gains.observer;
-        let disturbance = self.memory.observe(&motion, &model, corner);
+        self.observer.update(&motion, &model, corner);
         let input = ControlInput {
             motion: &motion,
             task: &task,
             model: &model,
             nominal_inertia: &self.body.nominal_inertia,
-            disturbance: &disturbance,
+            disturbance: self.observer.residual(),
         };
         let torque = self.setup.selection.torque(&input, &mut self.memory);
         if !torque.iter().all(|torque| torque.is_finite()) {
             // No finite input leads here; should it happen, close the brake.
-            self.memory = Memory::new();
+            self.unlearn();
             self.fail(Fault::because(Cause::BadValue));
             return self.torque_off();
         }
         probe.end(Phase::Law);
         let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
         self.excess = limited.excess;
+        let qd = motion.qd;
         if limited.flags != LimitFlags::EMPTY {
             self.limits = self.limits | limited.flags;
-            let qd = motion.qd;
             self.ease(&torque, &qd);
             self.strain(readings, &qd);
         } else {
             self.stuck = 0;
         }
         self.chatter.keep(&limited.motor_torque);
+        if self.operation == Operation::Manual {
+            self.watch_tool(&task.actual.task_velocity(&qd));
+        }
         probe.end(Phase::Limits);
         Actions {
             control: self.control_word(),
             torque: limited.motor_torque.into(),
         }
+    }
+
+    /// Forgets what law and observer have gathered.
+    fn unlearn(&mut self) {
+        self.memory = Memory::new();
+        self.observer = MomentumObserver::new();
     }
 
     /// Torque off; the brake holds the lift.

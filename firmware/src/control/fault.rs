@@ -23,6 +23,9 @@ pub const MAX_GAP_MS: u32 = milliseconds(Parameter::FeedbackGap);
 /// Age of the feedback at which the drives count as silent, ms: the watchdog time of moteus and the heartbeat of ODrive.
 /// The drives have switched off long before, after 5 samples without a command.
 pub const PEER_TIMEOUT_MS: u32 = milliseconds(Parameter::FeedbackTimeout);
+/// Time without a heartbeat after which a node whose heartbeat was heard counts as silent, ms: two that are lost, and a third that
+/// is late.
+pub const HEARTBEAT_TIMEOUT_MS: u32 = milliseconds(Parameter::HeartbeatTimeout);
 /// Time at a torque limit of an axis that hardly moves, ms: longer than any start or turning back takes, and short beside the
 /// seconds in which a motor at its peak torque heats up.
 pub const SATURATION_MS: u32 = milliseconds(Parameter::SaturationTime);
@@ -113,7 +116,7 @@ const fn row(
 }
 
 /// Every cause that the controller raises.
-pub static REACTIONS: [Row; 17] = {
+pub static REACTIONS: [Row; 19] = {
     use Latch::{Reset, Restart};
     use Limit::{AtOnce, EachAxis, Frames, Milliseconds, Percent};
     use Reaction::{Brake, EmergencyStop, None, Off, Stop};
@@ -131,6 +134,13 @@ pub static REACTIONS: [Row; 17] = {
             [Off, Off, Off],
             Reset,
         ),
+        // Nobody is there to see what the arm does, and nothing is wrong with it.
+        row(
+            Cause::OperatorSilent,
+            Milliseconds(HEARTBEAT_TIMEOUT_MS),
+            [Stop, None, None],
+            Reset,
+        ),
         row(
             Cause::Reordered,
             Frames(BAD_FRAMES),
@@ -143,6 +153,8 @@ pub static REACTIONS: [Row; 17] = {
             [Stop, Brake, None],
             Reset,
         ),
+        // As long as somebody else sends its commands, the stop meets them in every sample.
+        row(Cause::DuplicateNode, AtOnce, [Stop, None, None], Reset),
         // The checksum was right: the sender is wrong, or this controller's own arithmetic.
         row(Cause::BadValue, Frames(BAD_FRAMES), [Off, Off, Off], Reset),
         row(Cause::FollowingError, EachAxis, [Stop, Brake, Off], Reset),

@@ -28,13 +28,11 @@ use serde::{Deserialize, Serialize};
 
 pub use control_input::{ControlInput, Model, Motion, Task};
 pub use gains::Gains;
-use observer::MomentumObserver;
 
-/// What is remembered between samples: integrals and the observer.
+/// What a law remembers between samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Memory {
     integral: Vector4<f32>,
-    observer: MomentumObserver,
 }
 
 impl Memory {
@@ -42,19 +40,7 @@ impl Memory {
     pub fn new() -> Self {
         Self {
             integral: Vector4::zeros(),
-            observer: MomentumObserver::new(),
         }
-    }
-
-    /// What the torques of the last sample leave unexplained, by the model and the disturbance observer with this corner (rad/s): N m, N m,
-    /// N, N m. Watched with every law, used by those that compensate with it.
-    pub fn observe(&mut self, motion: &Motion<'_>, model: &Model, corner: f32) -> Vector4<f32> {
-        self.observer.update(motion, model, corner)
-    }
-
-    /// What it was in the last sample.
-    pub fn disturbance(&self) -> &Vector4<f32> {
-        self.observer.residual()
     }
 
     /// Adds `error` over one sample, except where the axis is saturated in that direction

@@ -85,6 +85,8 @@ pub struct Monitor {
 
 impl Monitor {
     /// A monitor of `arm`, sampled every `period` seconds, that has seen nothing.
+    // Out of line: what it needs of the stack is free again when the rest of a controller is built.
+    #[inline(never)]
     pub fn new(arm: &ArmModel, limits: &MonitorLimits, period: f32) -> Self {
         let mut monitor = Self {
             following_error: Vector4::zeros(),

@@ -23,6 +23,10 @@ pub struct Setup {
     pub monitor: MonitorLimits,
     /// Age of the feedback at which the drives count as silent, s.
     pub feedback_timeout: f32,
+    /// Time without a heartbeat after which a node whose heartbeat was heard counts as silent, s.
+    pub heartbeat_timeout: f32,
+    /// Time for which one hold lets moves go on in manual operation, s.
+    pub hold_time: f32,
     /// Time at a torque limit of an axis that hardly moves that stops the arm, s.
     pub saturation_time: f32,
     /// Time constant with which a motor warms up and cools down, s.
@@ -45,6 +49,8 @@ impl Setup {
             brake_delay: const { Parameter::BrakeDelay.initial(1.0) },
             monitor: MonitorLimits::DEFAULT,
             feedback_timeout: const { Parameter::FeedbackTimeout.initial(1.0) },
+            heartbeat_timeout: const { Parameter::HeartbeatTimeout.initial(1.0) },
+            hold_time: const { Parameter::HoldTime.initial(1.0) },
             saturation_time: const { Parameter::SaturationTime.initial(1.0) },
             thermal_time: const { Parameter::ThermalTime.initial(1.0) },
             bad_frames: const { Parameter::BadFrames.initial(1.0) as u32 },

@@ -62,6 +62,7 @@ impl Node {
             fault_value: fault.value,
             fault_limit: fault.limit,
             pace: (controller.pace() * 100.0 + 0.5) as u8,
+            operation: controller.operation(),
         }
     }
 }

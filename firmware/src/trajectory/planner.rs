@@ -126,6 +126,8 @@ pub struct Planner {
     speed: f32,
     /// Where the request is a jump.
     jump: Option<Jump>,
+    /// Whether moves are for manual operation, in which the [tool](super::tool_speed) is slow.
+    slow_tool: bool,
 }
 
 impl Planner {
@@ -167,6 +169,7 @@ impl Planner {
             target: Target::Joints(Vector4::zeros()),
             speed: 1.0,
             jump: None,
+            slow_tool: false,
         }
     }
 
@@ -185,6 +188,12 @@ impl Planner {
     /// Number of the current request, or of the last one.
     pub fn sequence(&self) -> u8 {
         self.draft.sequence
+    }
+
+    /// Whether the moves planned from now on are for manual operation: no point of the tool is faster than
+    /// [`PLANNED`](super::tool_speed::PLANNED).
+    pub fn keep_tool_slow(&mut self, slow: bool) {
+        self.slow_tool = slow;
     }
 
     /// Takes a request for a move from the joint positions `from`.
@@ -276,7 +285,7 @@ impl Planner {
     #[inline(never)]
     fn locate(&mut self, arm: &ArmModel, end: &Vector4<f32>) -> Result<(), Refusal> {
         let (path, gate) = self.target.path(arm, &self.draft.end, end)?;
-        self.jump = gate.map(Jump::new);
+        self.jump = gate.map(|gate| Jump::new(gate, self.slow_tool));
         self.draft.path = path;
         self.draft.start = 0.0;
         self.draft.lift = None;

@@ -56,6 +56,8 @@ pub struct MoveQueue {
     found: f32,
     /// Pace at which the motors do not get too hot. Only moves that begin follow it.
     cool: f32,
+    /// In manual operation: whether somebody holds it.
+    held: Option<bool>,
     /// Where the last planned move ends: the next one starts there.
     plan_end: Vector4<f32>,
     completed: u8,
@@ -72,6 +74,7 @@ impl MoveQueue {
             asked: 1.0,
             found: 1.0,
             cool: 1.0,
+            held: None,
             plan_end: Vector4::zeros(),
             completed: 0,
         }
@@ -110,7 +113,21 @@ impl MoveQueue {
 
     /// Share of its planned speed at which a move passes, once it has got there.
     pub fn pace(&self) -> f32 {
-        self.asked.min(self.found).min(self.cool)
+        if self.held == Some(false) {
+            0.0
+        } else {
+            self.asked.min(self.found).min(self.cool)
+        }
+    }
+
+    /// Whether somebody holds the motion: otherwise it pauses on its path. Moves planned from now on keep the tool slow. `None` in
+    /// automatic operation.
+    pub fn set_held(&mut self, held: Option<bool>) {
+        if held != self.held {
+            self.held = held;
+            self.planner.keep_tool_slow(held.is_some());
+            self.clock.set_pace(self.pace());
+        }
     }
 
     /// Share of its planned speed at which the move under way passes, or the next one will begin.
@@ -286,7 +303,7 @@ impl MoveQueue {
             qd: setpoint.ahead.qd,
             qdd: setpoint.ahead.qdd,
         };
-        let soon = stride.stopping || self.found < self.asked;
+        let soon = stride.stopping || self.found < self.asked || self.held == Some(false);
         let share = if soon { STOP_SHARE } else { RAMP_SHARE };
         let mut ramp = budget.ramp(&then, self.clock.time_scale(), share);
         if stride.stopping {

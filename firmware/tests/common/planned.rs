@@ -28,9 +28,20 @@ pub(crate) fn plan(
     target: Target,
     speed: f32,
 ) -> Result<Trajectory, Refusal> {
+    plan_with(Planner::new(), arm, payload, from, target, speed)
+}
+
+/// The same by this planner.
+pub(crate) fn plan_with(
+    mut planner: Planner,
+    arm: &ArmModel,
+    payload: &Payload,
+    from: &Vector4<f32>,
+    target: Target,
+    speed: f32,
+) -> Result<Trajectory, Refusal> {
     let body = Body::new(arm, payload);
     let budget = TorqueBudget { arm, body: &body };
-    let mut planner = Planner::new();
     planner.begin(
         &Request {
             sequence: 1,

@@ -12,8 +12,9 @@ use protocol::bus::{Transmit, TransmitError};
 use protocol::codec::{decode, encode};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Command, Compensation, ControlWord, DriveStatus, EStop, EStopReason, Feedback, Hello, Message,
-    Mode, Motion, MotionRequest, Outcome, ParameterRequest, RefusalReason, ResetReason, Server,
+    Cause, Command, Compensation, ControlWord, DriveStatus, EStop, EStopReason, Feedback,
+    Heartbeat, Hello, Message, Mode, Motion, MotionRequest, Node as Name, Outcome,
+    ParameterRequest, RefusalReason, ResetReason, Server,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
@@ -127,11 +128,7 @@ impl Bench {
 
     /// A bench in the middle of a fast move.
     pub(crate) fn moving() -> Self {
-        let mut config = Config::new(IRB_930, PERIOD);
-        // These drives report no torque: what an observer would make of that is no motion.
-        config.setup.selection.compensation = Compensation::None;
-        config.setup.monitor.collision = f32::MAX;
-        let mut bench = Self::with(config);
+        let mut bench = Self::with(by_itself());
         bench.enable();
         bench.follows = true;
         let target = [-1.0, 0.5, 0.05, -2.0];
@@ -275,6 +272,14 @@ impl Bench {
     }
 }
 
+/// For an arm that moves by itself: these drives report no torque, and what an observer would make of that is no motion.
+pub(crate) fn by_itself() -> Config {
+    let mut config = Config::new(IRB_930, PERIOD);
+    config.setup.selection.compensation = Compensation::None;
+    config.setup.monitor.collision = f32::MAX;
+    config
+}
+
 pub(crate) fn is_off(command: &Command) -> bool {
     !command.control.contains(ControlWord::TORQUE_ENABLE)
         && !command.control.contains(ControlWord::BRAKE_RELEASE)
@@ -287,4 +292,14 @@ pub(crate) fn estop() -> CanFrame {
         counter: 0,
     };
     encode(&Message::EStop(estop), 0).unwrap()
+}
+
+/// A heartbeat of this node in this state.
+pub(crate) fn heartbeat(name: Name, state: Mode, counter: u8) -> CanFrame {
+    let heartbeat = Heartbeat {
+        state,
+        cause: Cause::None,
+        reset: ResetReason::PowerOn,
+    };
+    encode(&Message::Heartbeat(name, heartbeat), counter).unwrap()
 }

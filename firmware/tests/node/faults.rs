@@ -8,11 +8,11 @@ use protocol::e2e::Profile;
 use protocol::frame::CanFrame;
 use protocol::messages::{
     Cause, ControlWord, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode,
-    MotionRequest, Outcome, State,
+    MotionRequest, Node as Name, Outcome, State,
 };
 use protocol::time::Period;
 
-use crate::bench::{Bench, PERIOD, SILENCE, estop, is_off};
+use crate::bench::{Bench, PERIOD, SILENCE, estop, heartbeat, is_off};
 
 fn emergencies(sent: &[Message]) -> Vec<Emergency> {
     sent.iter()
@@ -154,6 +154,13 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.now += SILENCE;
             bench.poll()
         }
+        Cause::OperatorSilent => {
+            bench
+                .wire
+                .to_node
+                .push_back(heartbeat(Name::Operator, Mode::Ready, 0));
+            bench.run(262)
+        }
         Cause::Reordered => {
             let frame = bench.next_feedback();
             bench.wire.to_node.push_back(frame);
@@ -163,6 +170,13 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             let good = bench.next_feedback();
             let short = CanFrame::fd(good.id(), &good.data()[..32], true).unwrap();
             repeat(&mut bench, short)
+        }
+        Cause::DuplicateNode => {
+            bench
+                .wire
+                .to_node
+                .push_back(heartbeat(Name::Controller, Mode::Ready, 3));
+            bench.step()
         }
         Cause::BadValue => {
             let frame = not_a_number(&bench.next_feedback());
@@ -228,12 +242,9 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.torque[2] = 1300;
             bench.run(3000)
         }
-        Cause::None
-        | Cause::DuplicateNode
-        | Cause::Babbling
-        | Cause::BusOff
-        | Cause::Overrun
-        | Cause::SchemaMismatch => return None,
+        Cause::None | Cause::Babbling | Cause::BusOff | Cause::Overrun | Cause::SchemaMismatch => {
+            return None;
+        }
     };
     Some((bench, sent))
 }
@@ -258,8 +269,10 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::SelfTest => format!("self test: {}", KnownAnswer::Model),
             Cause::FeedbackLost => "feedback lost: 7.0 ms, limit 5.0 ms".into(),
             Cause::PeerSilent => "peer silent: 100.0 ms, limit 100.0 ms".into(),
+            Cause::OperatorSilent => "operator silent: 258.0 ms, limit 250.0 ms".into(),
             Cause::Reordered => "reordered: 3 frames in a row".into(),
             Cause::Corrupted => "corrupted: 3 frames in a row".into(),
+            Cause::DuplicateNode => "duplicate node: identifier 0x741".into(),
             Cause::BadValue => "bad value: 3 frames in a row".into(),
             Cause::FollowingError => {
                 "following error, axis 2 (elbow): -0.100 rad, limit 0.050 rad".into()

@@ -11,8 +11,10 @@
 mod bench;
 mod faults;
 mod gains;
+mod manual;
 mod pair;
 mod parameters;
+mod peers;
 mod reports;
 mod requests;
 mod stops;

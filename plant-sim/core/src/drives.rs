@@ -11,14 +11,15 @@ use protocol::codec::{self, Encoder};
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Command, ControlWord, DriveStatus, Feedback, Message, NmtCommand, Node, ParameterError,
-    ParameterReply, ParameterRequest, Server,
+    Cause, Command, ControlWord, DriveStatus, Feedback, Heartbeat, Message, Mode, NmtCommand, Node,
+    ParameterError, ParameterReply, ParameterRequest, ResetReason, Server,
 };
 use protocol::parameters::{self, DriveParameter};
 use protocol::table;
 use protocol::time::{Instant, Period};
 
 use crate::clock::BrokenClock;
+use crate::heart::Heart;
 use crate::model::{DriveTrain, RobotModel};
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::plant::Plant;
@@ -37,6 +38,9 @@ pub struct Drives {
     sample: u32,
     /// Time of the next sample.
     next: Instant,
+    heart: Heart,
+    /// Why they started.
+    reset: ResetReason,
     encoder: Encoder,
     commands: Receiver,
     requests: Receiver,
@@ -59,14 +63,16 @@ pub struct Drives {
 impl Drives {
     /// Drives of `model`, sampled every `period`.
     pub fn new(model: &RobotModel, period: Period) -> Self {
-        Self::started(model.drive, period, Instant::ORIGIN)
+        Self::started(model.drive, period, Instant::ORIGIN, ResetReason::PowerOn)
     }
 
     /// Drives that have just been switched on.
-    fn started(train: DriveTrain, period: Period, next: Instant) -> Self {
+    fn started(train: DriveTrain, period: Period, next: Instant, reset: ResetReason) -> Self {
         Self {
             sample: 0,
             next,
+            heart: Heart::new(next, period),
+            reset,
             encoder: Encoder::default(),
             commands: Receiver::new(Profile::Fd),
             requests: Receiver::new(Profile::Fd),
@@ -123,6 +129,25 @@ impl Drives {
         self.encoder
             .encode(&Message::Feedback(feedback))
             .expect("encoder speeds and torques are finite and inside the ranges")
+    }
+
+    /// Gives a sign of life if it is due.
+    fn beat(&mut self, now: Instant, plant: &Plant, out: &mut Outbox) {
+        let (state, cause) = if plant.has_dip() {
+            (Mode::Fault, Cause::DriveFault)
+        } else if self.control.contains(ControlWord::TORQUE_ENABLE) {
+            (Mode::Enabled, Cause::None)
+        } else {
+            (Mode::Ready, Cause::None)
+        };
+        let heartbeat = Heartbeat {
+            state,
+            cause,
+            reset: self.reset,
+        };
+        let encoder = &mut self.encoder;
+        self.heart
+            .beat(now, (Node::Drives, heartbeat), encoder, out);
     }
 
     /// Takes a command that has just arrived. A damaged or old one is ignored.
@@ -193,7 +218,7 @@ impl Drives {
         {
             plant.set_brake(true);
             plant.set_torque_enabled(false);
-            *self = Self::started(self.train, self.period, self.next);
+            *self = Self::started(self.train, self.period, self.next, ResetReason::Software);
         }
     }
 
@@ -247,6 +272,7 @@ impl Peer for Drives {
         match received {
             None => {
                 let period = self.period.duration();
+                self.beat(now, plant, out);
                 self.next = now + BrokenClock::tick(&world.clock, period);
                 if BrokenClock::misses(&mut world.clock) {
                     self.watchdog(now, plant);

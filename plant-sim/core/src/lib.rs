@@ -50,6 +50,7 @@ mod convert;
 pub mod curves;
 pub mod drives;
 pub mod faults;
+mod heart;
 pub mod live;
 mod maths;
 pub mod metrics;

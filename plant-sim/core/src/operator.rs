@@ -4,20 +4,23 @@
 
 mod desk;
 pub(crate) mod program;
+mod signs;
 
 use protocol::codec::{self, Encoder};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, EStop, EStopReason, Hello, Message, Mode, Motion, MotionRequest, Node, Outcome,
-    ParameterReply, ParameterRequest, Server, State,
+    Cause, EStop, EStopReason, Hello, Message, Mode, MotionRequest, Node, Outcome, ParameterReply,
+    ParameterRequest, Server, State,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
 
+use crate::heart::Heart;
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::scenario::Scenario;
 use crate::world::{CellEvent, OperatorError, Spot, World};
 use program::{Action, Program, Task};
+use signs::Button;
 
 pub use desk::{Answer, Desk, Order};
 
@@ -31,6 +34,9 @@ const MOVE_LIMIT_S: f64 = 120.0;
 const ANY_MOVE_LIMIT_S: f64 = 1e9;
 /// Time without any frame after which the controller counts as silent: ten heartbeats.
 const SILENCE_LIMIT: Duration = Duration::from_secs(1);
+
+/// Its first heartbeat comes between those of the drives.
+const FIRST_HEARTBEAT: Instant = Instant::from_nanos(50_000_000);
 
 /// Progress of the current action.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +58,9 @@ pub struct Operator {
     /// Polling period, and time of the next poll.
     period: Period,
     next: Instant,
+    heart: Heart,
+    /// The button of manual operation.
+    button: Button,
     given_up: bool,
     encoder: Encoder,
     sequence: u8,
@@ -84,6 +93,8 @@ impl Operator {
             progress: Progress::Due,
             period: Period::of_rate(scenario.rate_hz),
             next: Instant::ORIGIN,
+            heart: Heart::new(FIRST_HEARTBEAT, Period::of_rate(scenario.rate_hz)),
+            button: Button::default(),
             given_up: false,
             encoder: Encoder::default(),
             sequence: 0,
@@ -147,6 +158,7 @@ impl Operator {
     }
 
     fn stop_working<const N: usize>(&mut self, last: [Action; N]) {
+        self.button.press(false);
         self.program.only(last);
         self.current = self.program.next();
         self.progress = Progress::Due;
@@ -241,21 +253,13 @@ impl Operator {
                 reason: EStopReason::BUTTON,
                 counter: 0,
             }),
+            Action::Hold(pressed) => {
+                self.button.press(*pressed);
+                return None;
+            }
             _ => return None,
         };
         // A value that no frame can carry is not sent; the error of the missing reply then names the request.
-        self.encoder.encode(&message).ok()
-    }
-
-    /// A request whose answer the program does not wait for.
-    fn send(&mut self, request: MotionRequest) -> Option<CanFrame> {
-        if let MotionRequest::SetOverride { pace } = request {
-            self.pace = pace;
-            self.held = false;
-        }
-        self.sequence = self.sequence.wrapping_add(1);
-        let sequence = self.sequence;
-        let message = Message::Motion(Motion { sequence, request });
         self.encoder.encode(&message).ok()
     }
 
@@ -326,7 +330,7 @@ impl Operator {
                 (arrived, limit)
             }
             Action::Dwell(time) => (waited >= *time, Duration::MAX),
-            Action::EmergencyStop | Action::Cell(_) => (true, Duration::MAX),
+            Action::EmergencyStop | Action::Hold(_) | Action::Cell(_) => (true, Duration::MAX),
         };
         if complete || waited <= limit {
             return Ok(complete);
@@ -388,7 +392,7 @@ impl Peer for Operator {
         match received {
             Some(frame) => self.receive(now, frame),
             None => {
-                self.next = now + self.period.duration();
+                self.tick(now, out);
                 self.step(now, world, out);
             }
         }

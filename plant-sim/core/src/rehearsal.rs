@@ -109,6 +109,8 @@ struct Stage {
     before: Vector4<f32>,
     samples: u64,
     sequence: u8,
+    /// Whether the operator holds moves, in manual operation.
+    holds: bool,
     moves: Vec<Move>,
     /// Whether an override of 0 holds the arm.
     held: bool,
@@ -135,6 +137,7 @@ impl Stage {
             before: start,
             samples: 0,
             sequence: 0,
+            holds: false,
             moves: Vec::new(),
             held: false,
             under_way: VecDeque::new(),
@@ -178,6 +181,10 @@ impl Stage {
             Action::Dwell(time) => {
                 let samples = (time.seconds() / f64::from(self.period)).ceil() as u64;
                 (0..samples).try_for_each(|_| self.sample())
+            }
+            Action::Hold(pressed) => {
+                self.holds = *pressed;
+                Ok(())
             }
             Action::Hello | Action::EmergencyStop | Action::Cell(_) => Ok(()),
         }
@@ -268,6 +275,10 @@ impl Stage {
 
     /// One sample, at which the arm is where the reference of the last one leads.
     fn sample(&mut self) -> Result<(), OperatorError> {
+        if self.holds && matches!(self.controller.mode(), Mode::Enabled | Mode::Moving) {
+            // Accepted, it is not answered.
+            self.controller.request(0, &MotionRequest::Hold);
+        }
         // The command acts later than in the middle of the sample, whose speed is the mean.
         let Rates { qd, qdd } = *self.controller.ahead();
         let mean = qd - qdd * self.controller.setup().command_delay;

@@ -4,6 +4,7 @@ mod change;
 mod check;
 mod error;
 mod library;
+mod operation;
 mod requirement;
 mod step;
 
@@ -23,11 +24,12 @@ pub use check::millimetres;
 use error::for_people;
 pub use error::{Place, ScenarioError};
 pub use library::{built_in, instead_of, names};
+pub use operation::OperationName;
 pub(crate) use requirement::Measured;
 pub use requirement::{Axis, Ending, Quantity, Requirement, StateName};
 
 pub use crate::text::Source;
-pub use step::{Elbow, Joints, Jump, Line, Override, Step};
+pub use step::{Elbow, Joints, Jump, Line, Override, Release, Step};
 
 /// What to run. Lengths in m in frame 0, angles in rad. An unknown key is refused.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -46,6 +48,10 @@ pub struct Scenario {
     pub rate_hz: f64,
     /// Control law and compensation, such as `computed-torque:observer`.
     pub law: LawChoice,
+    /// How the arm is operated: in `manual` it moves only while the operator holds a button, as here he does unless a step says
+    /// otherwise, and no faster at the tool than 250 mm/s.
+    #[serde(default, skip_serializing_if = "OperationName::is_automatic")]
+    pub operation: OperationName,
     /// Gains; otherwise the controller's defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gains: Option<GainsSpec>,

@@ -197,7 +197,11 @@ impl RunConfig {
                     target = Some([pose.x, pose.y, pose.z, pose.yaw]);
                 }
                 Step::Stop(_) | Step::Estop(_) => target = None,
-                Step::Dwell(_) | Step::Override(_) | Step::Pick(_) | Step::Place {} => {}
+                Step::Dwell(_)
+                | Step::Override(_)
+                | Step::Release(_)
+                | Step::Pick(_)
+                | Step::Place {} => {}
             }
         }
         target

@@ -70,7 +70,7 @@ fn documents() -> [(Value, Value, Reader); 3] {
     nothing["inertia_com_diag"] = json!([0.0, 0.0, 0.0]);
     let to = [0.6, 0.1, -0.2, 0.5];
     let work = json!({
-        "name": "all", "about": "everything", "ends": "stopped", "faults": ["encoder:elbow:stuck@0.3s"], "seed": 1, "cycles": 1, "rate_hz": 2000.0, "law": "computed-torque:observer", "start": [0.5, 0.1, -0.2, 0.0], "start_elbow": "positive", "start_turn": 0,
+        "name": "all", "about": "everything", "ends": "stopped", "faults": ["encoder:elbow:stuck@0.3s"], "seed": 1, "cycles": 1, "rate_hz": 2000.0, "law": "computed-torque:observer", "operation": "manual", "start": [0.5, 0.1, -0.2, 0.0], "start_elbow": "positive", "start_turn": 0,
         "gains": { "bandwidth": 100.0, "damping": 1.0, "observer": 100.0 },
         "payload": nothing, "mismatch": { "friction": 1.0, "payload": 1.0 },
         "cycle": [

@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use serde::Deserialize;
-use sim::scenario::{Ending, Jump, Mismatch, PayloadSpec, Scenario, Step};
+use sim::scenario::{Ending, Jump, Mismatch, OperationName, PayloadSpec, Scenario, Step};
 use sim::selection::LawChoice;
 use sim::text::Source;
 
@@ -154,6 +154,7 @@ impl Case {
             cycles: CYCLES,
             rate_hz: self.rate_hz,
             law: law(),
+            operation: OperationName::Automatic,
             gains: None,
             start,
             start_elbow: None,

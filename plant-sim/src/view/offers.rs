@@ -1,5 +1,7 @@
 //! What a page can ask for: the page draws what it finds here, and knows none of it by itself.
 
+mod jog;
+
 use protocol::messages::{Law, Node};
 use protocol::table::TABLE;
 use serde::Serialize;
@@ -71,6 +73,8 @@ struct Button {
     with: serde_json::Value,
     /// Always in sight.
     urgent: bool,
+    /// As long as it is pressed, `hold` is asked for again and again, and then `stop`.
+    held: bool,
 }
 
 fn button(label: &str, ask: &'static str, takes: &'static [&'static str]) -> Button {
@@ -80,6 +84,7 @@ fn button(label: &str, ask: &'static str, takes: &'static [&'static str]) -> But
         takes,
         with: serde_json::json!({}),
         urgent: false,
+        held: false,
     }
 }
 
@@ -153,7 +158,8 @@ pub fn of_run(scenario: &Scenario, robot: &RobotModel) -> Vec<Group> {
             fields: vec![number("pace", "Override", [0.0, 100.0], 1.0, 100.0, "%")],
             buttons: vec![button("Set", "override", &["pace"])],
         },
-        jog(),
+        jog::by_hand(robot),
+        jog::by_steps(),
         Group {
             title: "Payload and law",
             hint: None,
@@ -258,23 +264,6 @@ fn moves(scenario: &Scenario, robot: &RobotModel) -> Group {
             ),
             button("Line", "line", &["x", "y", "z", "yaw", "speed"]),
         ],
-    }
-}
-
-fn jog() -> Group {
-    let buttons = AXES.iter().flat_map(|axis| {
-        [("−", -1.0), ("+", 1.0)].map(|(sign, direction)| Button {
-            with: serde_json::json!({ "axis": axis, "sign": direction }),
-            ..button(&format!("{axis} {sign}"), "jog", &["step", "speed"])
-        })
-    });
-    Group {
-        title: "Jog",
-        hint: Some(
-            "Small joint moves, at the speed above: the link has no message to move while a button is held.",
-        ),
-        fields: vec![number("step", "Step", [0.1, 45.0], 0.1, 5.0, "° or mm")],
-        buttons: buttons.collect(),
     }
 }
 
@@ -389,7 +378,9 @@ mod tests {
                 let asked: Asked = serde_json::from_value(request.clone())
                     .unwrap_or_else(|error| panic!("{request}: {error}"));
                 let wish = match &asked {
-                    Asked::Jog { .. } => asked.jog(Some([0.0; 4])).map(|(wish, _)| wish),
+                    Asked::Jog { .. } | Asked::Push { .. } => {
+                        asked.jog(Some([0.0; 4])).map(|(wish, _)| wish)
+                    }
                     _ => asked.wish(),
                 };
                 assert!(wish.is_ok(), "{request}: {wish:?}");

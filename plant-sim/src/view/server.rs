@@ -216,6 +216,9 @@ async fn wish(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
 fn understood(shared: &Shared, body: &[u8]) -> Result<Wish, String> {
     let asked: Asked =
         serde_json::from_slice(body).map_err(|error| format!("not understood: {error}"))?;
+    if let Asked::Push { .. } = asked {
+        return asked.jog(shared.air.stands()).map(|(wish, _)| wish);
+    }
     if !matches!(asked, Asked::Jog { .. }) {
         *lock(&shared.jogged) = None;
         return asked.wish();

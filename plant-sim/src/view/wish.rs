@@ -1,6 +1,6 @@
 //! What a page asks for, in its own words: `{"jump": {"x": 600, ...}}`, in millimetres, degrees and percents.
 
-use protocol::messages::{MotionRequest, Posture};
+use protocol::messages::{MotionRequest, Operation, Posture};
 use serde::Deserialize;
 use sim::faults::{Fault, FaultError};
 use sim::model::AXES;
@@ -51,6 +51,18 @@ pub(super) enum Asked {
         /// 1 or -1.
         sign: f64,
         speed: f64,
+    },
+    /// A move of one axis to this end of its range, ° or mm, while a button is held.
+    Push {
+        axis: String,
+        end: f64,
+        speed: f64,
+    },
+    /// The button is held.
+    Hold {},
+    /// Who keeps moves going.
+    Operation {
+        operation: String,
     },
     /// Speed override.
     Override {
@@ -125,7 +137,18 @@ impl Asked {
                 speed: share(speed),
                 posture: Posture::NEAREST,
             }),
-            Self::Jog { .. } => Err("a jog begins where the arm is".into()),
+            Self::Hold {} => request(MotionRequest::Hold),
+            Self::Operation { operation } => {
+                let operation = Operation::from_name(operation).ok_or_else(|| {
+                    let names: Vec<_> = Operation::ALL.iter().map(|it| it.name()).collect();
+                    format!(
+                        "there is no operation {operation:?}; allowed: {}",
+                        names.join(", ")
+                    )
+                })?;
+                request(MotionRequest::SetOperation { operation })
+            }
+            Self::Jog { .. } | Self::Push { .. } => Err("a jog begins where the arm is".into()),
             Self::Override { pace } => request(MotionRequest::SetOverride { pace: share(*pace) }),
             Self::Payload { mass } => Ok(Wish::Order(Order::Carry(PayloadSpec::compact(*mass)))),
             Self::Law { law } => request(MotionRequest::SelectLaw {
@@ -152,19 +175,14 @@ impl Asked {
 }
 
 impl Asked {
-    /// A move of one axis from `stand`, and where it leads to.
+    /// A move of one axis from `stand`, by a step or to the end of its range, and where it leads to.
     ///
     /// # Errors
     /// It is no jog, or nobody knows where the arm is.
     pub(super) fn jog(&self, stand: Stand) -> Result<(Wish, [f32; 4]), String> {
-        let Self::Jog {
-            axis,
-            step,
-            sign,
-            speed,
-        } = self
-        else {
-            return Err("not a jog".into());
+        let (axis, speed) = match self {
+            Self::Jog { axis, speed, .. } | Self::Push { axis, speed, .. } => (axis, speed),
+            _ => return Err("not a jog".into()),
         };
         let place = AXES
             .iter()
@@ -172,17 +190,27 @@ impl Asked {
             .ok_or_else(|| format!("there is no axis {axis:?}; allowed: {}", AXES.join(", ")))?;
         let mut target =
             stand.ok_or("the drives have sent no feedback yet: where the arm is, is not known")?;
-        let step = sign * step;
-        target[place] += if place == LIFT {
-            metres(step)
-        } else {
-            step.to_radians() as f32
+        let unit = |value: f64| {
+            if place == LIFT {
+                metres(value)
+            } else {
+                value.to_radians() as f32
+            }
         };
+        match self {
+            Self::Push { end, .. } => target[place] = unit(*end),
+            Self::Jog { step, sign, .. } => target[place] += unit(sign * step),
+            _ => {}
+        }
         let request = MotionRequest::MoveJoint {
             target,
             speed: share(*speed),
         };
-        Ok((Wish::Order(Order::Request(request)), target))
+        let order = match self {
+            Self::Push { .. } => Order::Jog(request),
+            _ => Order::Request(request),
+        };
+        Ok((Wish::Order(order), target))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Cause, Compensation, Fault, FaultAxis, Law, Mode};
+use super::{Cause, Compensation, Fault, FaultAxis, Law, Mode, Operation};
 use crate::codes::bits;
 
 /// Drives to controller, every sample: state of the motors at the sampling instant.
@@ -106,6 +106,8 @@ pub struct State {
     /// Share of its planned speed at which a move passes or would pass now, %: less than 100 with a speed override, and where the
     /// controller has slowed down by itself.
     pub pace: u8,
+    /// How the arm is operated.
+    pub operation: Operation,
 }
 
 impl State {

@@ -18,6 +18,8 @@ codes! {
         Lift = 3, "lift";
         /// Axis 4: turns the shaft.
         Wrist = 4, "wrist";
+        /// No axis, but the tool.
+        Tool = 5, "tool";
     }
 }
 
@@ -82,6 +84,8 @@ pub enum Unit {
     DriveStatus,
     /// Code of a [`KnownAnswer`].
     KnownAnswer,
+    /// Identifier of a frame.
+    Identifier,
 }
 
 impl Unit {
@@ -89,7 +93,7 @@ impl Unit {
     #[must_use]
     pub const fn symbol(self) -> &'static str {
         match self {
-            Self::None | Self::DriveStatus | Self::KnownAnswer => "",
+            Self::None | Self::DriveStatus | Self::KnownAnswer | Self::Identifier => "",
             Self::Radian => "rad",
             Self::Metre => "m",
             Self::RadianOrMetre => "rad or m",
@@ -134,6 +138,7 @@ impl Unit {
                 Ok(answer) => f.write_str(answer.name()),
                 Err(unknown) => write!(f, "{unknown}"),
             },
+            Self::Identifier => write!(f, "identifier {:#05x}", value as u16),
         }
     }
 }
@@ -162,11 +167,15 @@ impl Fault {
     /// Unit of value and limit.
     #[must_use]
     pub const fn unit(&self) -> Unit {
-        use FaultAxis::{Lift, None};
+        use FaultAxis::{Lift, None, Tool};
         match (self.cause, self.axis) {
             (Cause::SelfTest, _) => Unit::KnownAnswer,
+            (Cause::DuplicateNode, _) => Unit::Identifier,
             (Cause::DriveFault, _) | (Cause::EncoderFault, None) => Unit::DriveStatus,
-            (Cause::FeedbackLost | Cause::PeerSilent | Cause::OverTorque, _) => Unit::Millisecond,
+            (
+                Cause::FeedbackLost | Cause::PeerSilent | Cause::OperatorSilent | Cause::OverTorque,
+                _,
+            ) => Unit::Millisecond,
             (Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => Unit::Frame,
             (Cause::FollowingError | Cause::SoftLimit | Cause::StuckSensor, None) => {
                 Unit::RadianOrMetre
@@ -183,11 +192,10 @@ impl Fault {
             (Cause::Collision, _) => Unit::NewtonMetre,
             (Cause::Chatter | Cause::Overload, _) => Unit::Percent,
             (Cause::OverSpeed, None) => Unit::SpeedOfAxis,
-            (Cause::OverSpeed, Lift) => Unit::MetrePerSecond,
+            (Cause::OverSpeed, Lift | Tool) => Unit::MetrePerSecond,
             (Cause::OverSpeed, _) => Unit::RadianPerSecond,
             (
                 Cause::None
-                | Cause::DuplicateNode
                 | Cause::Babbling
                 | Cause::BusOff
                 | Cause::Overrun
@@ -205,8 +213,10 @@ impl fmt::Display for Fault {
         for c in self.cause.name().chars() {
             f.write_char(if c == '-' { ' ' } else { c })?;
         }
-        if self.axis != FaultAxis::None {
-            write!(f, ", axis {} ({})", self.axis.code(), self.axis)?;
+        match self.axis {
+            FaultAxis::None => {}
+            FaultAxis::Tool => write!(f, ", {}", self.axis)?,
+            axis => write!(f, ", axis {} ({axis})", axis.code())?,
         }
         let unit = self.unit();
         if unit != Unit::None && self.value != 0.0 {

@@ -14,7 +14,8 @@ mod service;
 pub use cyclic::{Command, ControlWord, DriveStatus, Feedback, LimitFlags, State};
 pub use fault::{Fault, FaultAxis, KnownAnswer, Unit};
 pub use motion::{
-    Compensation, Law, Motion, MotionReply, MotionRequest, Outcome, Refusal, RefusalReason,
+    Compensation, Law, Motion, MotionReply, MotionRequest, Operation, Outcome, Refusal,
+    RefusalReason,
 };
 pub use parameter::{Hello, ParameterError, ParameterReply, ParameterRequest, Server};
 pub use posture::{ElbowSide, Posture, WristTurn};

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::Posture;
 use crate::codes::codes;
 
-/// Operator to controller: one request, answered by one [`MotionReply`].
+/// Operator to controller: one request, answered by one [`MotionReply`], but for a [hold](MotionRequest::Hold).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Motion {
@@ -87,6 +87,14 @@ pub enum MotionRequest {
         /// Share of the speed that each move was planned with, 0 to 1; 0 holds the arm on its path until it is raised again.
         pace: f32,
     },
+    /// How the arm is operated from now on, where nothing moves.
+    SetOperation {
+        /// The operation.
+        operation: Operation,
+    },
+    /// In manual operation: moves may go on for another hold time. A sign of life that is repeated as long as a person holds a button;
+    /// answered only where it is refused.
+    Hold,
 }
 
 impl MotionRequest {
@@ -103,6 +111,8 @@ impl MotionRequest {
         (8, "select-law"),
         (9, "set-gains"),
         (10, "set-override"),
+        (11, "set-operation"),
+        (12, "hold"),
     ];
 
     /// Name, lower case with hyphens.
@@ -120,6 +130,8 @@ impl MotionRequest {
             Self::SelectLaw { .. } => "select-law",
             Self::SetGains { .. } => "set-gains",
             Self::SetOverride { .. } => "set-override",
+            Self::SetOperation { .. } => "set-operation",
+            Self::Hold => "hold",
         }
     }
 
@@ -139,6 +151,16 @@ impl MotionRequest {
             self,
             Self::MoveJoint { .. } | Self::MoveLine { .. } | Self::Jump { .. }
         )
+    }
+}
+
+codes! {
+    /// Who keeps moves going (operating modes of ISO 10218-1).
+    pub enum Operation {
+        /// Moves go on by themselves.
+        Automatic = 0, "automatic";
+        /// Moves go on only while they are held, and no faster at the tool than 250 mm/s.
+        Manual = 1, "manual";
     }
 }
 

@@ -203,7 +203,7 @@ codes! {
         Reordered = 4, "reordered";
         /// Frames arrived with a wrong end-to-end checksum.
         Corrupted = 5, "corrupted";
-        /// Another node sends on the identifier of a peer, or a log is replayed. Reserved: not raised yet.
+        /// Another node sends what only the controller sends: a second controller, or a log that is played.
         DuplicateNode = 6, "duplicate-node";
         /// A position does not change although the axis is off its reference or at its torque limit: encoder or axis is stuck.
         StuckSensor = 7, "stuck-sensor";
@@ -231,6 +231,8 @@ codes! {
         SchemaMismatch = 18, "schema-mismatch";
         /// An encoder is not valid, jumps further than the axis can move, or moves against its torque, as with a wrong sign.
         EncoderFault = 19, "encoder-fault";
+        /// The operator's heartbeat was heard, and has stopped.
+        OperatorSilent = 20, "operator-silent";
         /// An axis moves otherwise than by its torque and the model: it has met something, or its encoder is late.
         Collision = 21, "collision";
         /// The torque of an axis swings from sample to sample: its loop is not stable.
@@ -252,7 +254,7 @@ impl Cause {
             Self::SchemaMismatch => 0x6300,
             Self::StuckSensor | Self::EncoderFault => 0x7300,
             Self::Babbling => 0x8110,
-            Self::PeerSilent => 0x8130,
+            Self::PeerSilent | Self::OperatorSilent => 0x8130,
             Self::BusOff => 0x8140,
             Self::DuplicateNode => 0x8150,
             Self::Reordered | Self::Corrupted | Self::BadValue => 0x8200,

@@ -100,8 +100,12 @@ parameters! {
         BadFrames = 0x0033, "bad-frames", "frames", Always, whole(1.0, 20.0, 3.0);
         /// Time in one move at a torque limit of an axis that hardly moves that stops the arm.
         SaturationTime = 0x0034, "saturation-time", "s", Always, real(0.02, 10.0, 0.2);
+        /// Time without a heartbeat after which a node whose heartbeat was heard counts as silent.
+        HeartbeatTimeout = 0x0035, "heartbeat-timeout", "s", Always, real(0.12, 5.0, 0.25);
+        /// Time for which one hold lets moves go on in manual operation.
+        HoldTime = 0x0036, "hold-time", "s", AtRest, real(0.05, 0.5, 0.15);
         /// Time constant with which a motor warms up and cools down.
-        ThermalTime = 0x0035, "thermal-time", "s", Always, real(1.0, 3600.0, 30.0);
+        ThermalTime = 0x0037, "thermal-time", "s", Always, real(1.0, 3600.0, 30.0);
     }
 }
 

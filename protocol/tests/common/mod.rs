@@ -125,6 +125,8 @@ fn request() -> impl Strategy<Value = MotionRequest> {
             }
         ),
         (0.0..=1.0f32).prop_map(|pace| R::SetOverride { pace }),
+        select(Operation::ALL).prop_map(|operation| R::SetOperation { operation }),
+        Just(R::Hold),
     ]
 }
 
@@ -137,7 +139,11 @@ fn state() -> impl Strategy<Value = Message> {
     (
         (select(Mode::ALL), select(Cause::ALL), 0..0x4000u16),
         any::<(u8, u8, u16, u16, u32)>(),
-        (select(Law::ALL), select(Compensation::ALL)),
+        (
+            select(Law::ALL),
+            select(Compensation::ALL),
+            select(Operation::ALL),
+        ),
         uniform4(any_f32()),
         (select(FaultAxis::ALL), any_f32(), any_f32(), any::<u8>()),
     )
@@ -158,6 +164,7 @@ fn state() -> impl Strategy<Value = Message> {
                 fault_value: fault.1,
                 fault_limit: fault.2,
                 pace: fault.3,
+                operation: selected.2,
             })
         })
 }

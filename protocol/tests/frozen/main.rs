@@ -122,6 +122,7 @@ fn state() {
             fault_value: 0.0,
             fault_limit: 0.0,
             pace: 0,
+            operation: Operation::Automatic,
         }),
         128,
         "300##1090B003803090201FFFF1098020004010000003F000080BE0000003E000080BF000000000000000000\
@@ -149,10 +150,39 @@ fn state_with_a_fault() {
             fault_value: 0.0021,
             fault_limit: 0.002,
             pace: 0,
+            operation: Operation::Automatic,
         }),
         129,
         "300##1080B04200007010002000000000004020000003F000080BE27A0093B000080BF0327A0093B6F12033\
         B0000000081624D",
+    );
+}
+
+/// The tool, in manual operation: a byte that was padding.
+#[test]
+fn state_in_manual_operation() {
+    check(
+        Message::State(State {
+            mode: Mode::FaultReaction,
+            cause: Cause::OverSpeed,
+            limits: LimitFlags::PREDICTED,
+            queue: 1,
+            completed: 7,
+            overruns: 1,
+            rejected: 2,
+            worst_tick: 0,
+            law: Law::ComputedTorqueJoint,
+            compensation: Compensation::Observer,
+            tracking_error: [0.5, -0.25, 0.0021, -1.0],
+            fault_axis: FaultAxis::Tool,
+            fault_value: 0.275,
+            fault_limit: 0.25,
+            pace: 9,
+            operation: Operation::Manual,
+        }),
+        130,
+        "300##1080C00200107010002000000000004020000003F000080BE27A0093B000080BF05CDCC8C3E0000803E\
+        090100008284BD",
     );
 }
 

@@ -210,3 +210,31 @@ fn jump_with_a_posture() {
         00000000059FAD",
     );
 }
+
+#[test]
+fn set_operation() {
+    check(
+        Message::Motion(Motion {
+            sequence: 3,
+            request: MotionRequest::SetOperation {
+                operation: Operation::Manual,
+            },
+        }),
+        6,
+        "2C0##1030B010000000000000000000000000000000000000000000000000000000000000000000000000000\
+        0000000006FA34",
+    );
+}
+
+#[test]
+fn hold() {
+    check(
+        Message::Motion(Motion {
+            sequence: 4,
+            request: MotionRequest::Hold,
+        }),
+        7,
+        "2C0##1040C000000000000000000000000000000000000000000000000000000000000000000000000000000\
+        0000000007CBDE",
+    );
+}

@@ -25,7 +25,7 @@ const SILENCE: Duration = Duration::from_secs(1);
 /// Why the controller ended.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ShellError {
-    /// Another controller uses the same identifiers.
+    /// Another controller uses the same identifiers. One that comes later is a fault, which stops the arm.
     #[error(
         "another controller is on {bus}: {name} (identifier {id:#05x}) was heard, which only a controller sends; \
          stop one of the two"
@@ -92,7 +92,7 @@ impl Shell {
         while !stop.load(Ordering::Relaxed) {
             self.wait()?;
             while let Some(stamped) = self.link.take() {
-                self.take(&stamped)?;
+                self.take(&stamped);
             }
             if self.clock.idle() {
                 self.poll(None);
@@ -158,9 +158,8 @@ impl Shell {
         Ok(())
     }
 
-    fn take(&mut self, stamped: &Stamped) -> Result<(), ShellError> {
+    fn take(&mut self, stamped: &Stamped) {
         let frame = &stamped.frame;
-        self.refuse_duplicate(frame)?;
         if self.clock.observe(frame) {
             self.poll(None);
         }
@@ -174,7 +173,6 @@ impl Shell {
         if is_feedback(frame) {
             self.answered(stamped.at);
         }
-        Ok(())
     }
 
     /// Polls the node with one frame or with the time alone.

@@ -46,6 +46,7 @@ impl Controller {
 
     /// What to follow at this sample.
     pub(super) fn advance(&mut self, steps: u32, lead: f32) {
+        self.loosen(steps);
         if self.state == State::Enabled {
             if !self.queue.is_ready() {
                 self.setpoint = Setpoint::rest(self.setpoint.reference.q);

@@ -45,6 +45,8 @@ impl Store for Controller {
             Parameter::SpeedFactor => &mut monitor.speed_factor,
             Parameter::BrakeDelay => &mut setup.brake_delay,
             Parameter::FeedbackTimeout => &mut setup.feedback_timeout,
+            Parameter::HeartbeatTimeout => &mut setup.heartbeat_timeout,
+            Parameter::HoldTime => &mut setup.hold_time,
             Parameter::SaturationTime => &mut setup.saturation_time,
             Parameter::ThermalTime => &mut setup.thermal_time,
             Parameter::FeedbackGap => &mut monitor.gap,

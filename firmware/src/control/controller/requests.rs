@@ -4,7 +4,7 @@ use nalgebra::Vector4;
 use protocol::messages::{Compensation, MotionRequest, Refusal, RefusalReason};
 
 use super::Controller;
-use crate::control::laws::{Gains, Memory, Selection};
+use crate::control::laws::{Gains, Selection};
 use crate::control::states::{Event, State};
 use crate::mechanics::arm::{ModelError, Payload, Rule};
 use crate::mechanics::body::Body;
@@ -15,6 +15,7 @@ use crate::trajectory::request::{Request, Target};
 pub(super) enum Answer {
     Now,
     WhenPlanned,
+    Never,
 }
 
 impl Controller {
@@ -69,7 +70,12 @@ impl Controller {
                 self.queue.set_pace(*pace);
                 Answer::Now
             }
+            MotionRequest::Hold => self.hold()?,
             _ if !self.is_idle() => return Err(Refusal::because(RefusalReason::Moving)),
+            MotionRequest::SetOperation { operation } => {
+                self.operate_as(*operation);
+                Answer::Now
+            }
             MotionRequest::SetPayload { mass, com, inertia } => {
                 let payload = Payload {
                     mass: *mass,
@@ -123,7 +129,7 @@ impl Controller {
     // Out of line, like the next: each has several callers, none of them in a sample.
     #[inline(never)]
     pub(super) fn forget(&mut self) {
-        self.memory = Memory::new();
+        self.unlearn();
         self.queue.try_full_pace();
     }
 

@@ -5,7 +5,6 @@ use protocol::messages::{Cause, ControlWord, DriveStatus, Fault, LimitFlags};
 
 use super::Controller;
 use crate::control::fault;
-use crate::control::laws::Memory;
 use crate::control::monitor::Monitor;
 use crate::control::readings::Readings;
 use crate::control::states::{Event, Halt, State};
@@ -47,7 +46,7 @@ impl Controller {
     fn enter(&mut self, next: State) {
         match next {
             State::Enabling(_) => {
-                self.memory = Memory::new();
+                self.unlearn();
                 self.monitor.reset();
             }
             State::Fault(halt) | State::EStop(halt) => {
@@ -93,10 +92,11 @@ impl Controller {
         if let Some(fault) = self
             .monitor
             .check(readings, q, qd, &(error + moved), &self.error)
+            && !(fault.cause == Cause::SoftLimit && self.is_freed(q))
         {
             self.fail(fault);
         }
-        let felt = self.memory.disturbance();
+        let felt = self.observer.residual();
         if let Some(axis) = self.monitor.feels(felt) {
             let wanted = &self.setpoint.reference.qd;
             let fault = self

@@ -34,16 +34,16 @@ impl MomentumObserver {
         }
     }
 
-    /// Estimated disturbance at the joints in the last sample.
+    /// Estimated disturbance at the joints, positive along +q: N m, N m, N, N m.
     pub fn residual(&self) -> &Vector4<f32> {
         &self.residual
     }
 
-    /// Estimated disturbance at the joints after one more sample, positive along +q.
+    /// Estimates the disturbance after one more sample.
     ///
     /// The corner is bounded to half a radian per sample, where the discrete filter still behaves like the continuous
     /// one.
-    pub fn update(&mut self, motion: &Motion<'_>, model: &Model, corner: f32) -> Vector4<f32> {
+    pub fn update(&mut self, motion: &Motion<'_>, model: &Model, corner: f32) {
         let period = motion.period;
         // Velocities are means over a sample and stand for its middle. The inertia is that of its end: half a sample of the
         // change M' qd = C qd + C^T qd takes the momentum back to the middle.
@@ -53,7 +53,7 @@ impl MomentumObserver {
             self.started = true;
             self.expected = momentum;
             self.previous_torque = motion.torque;
-            return self.residual;
+            return;
         }
         // Between two such velocities act the second half of one torque sample and the first half of the next, and the
         // friction of the instant between them.
@@ -69,7 +69,6 @@ impl MomentumObserver {
         let greatest = 0.5 / period;
         let corner = if corner < greatest { corner } else { greatest };
         self.residual = (momentum - self.expected) * corner;
-        self.residual
     }
 }
 

@@ -17,6 +17,7 @@ use crate::trajectory::Lift;
 use crate::trajectory::path::Path;
 use crate::trajectory::profile::{Bounds, SCurve};
 use crate::trajectory::request::Gate;
+use crate::trajectory::tool_speed::{OF_A_PART, PLANNED};
 use crate::trajectory::torque_budget::TorqueBudget;
 
 /// Heights that are tried at most: as asked for, as high as is useful, and three between them.
@@ -55,15 +56,18 @@ pub(super) struct Jump {
     too_high: Tried,
     /// Whether the last one tried fits.
     fitted: bool,
+    /// Whether strokes are for manual operation.
+    slow: bool,
     round: u8,
     /// From the end of the travel to that of the descent, s.
     tail: f32,
 }
 
 impl Jump {
-    pub(super) fn new(gate: Gate) -> Self {
+    pub(super) fn new(gate: Gate, slow: bool) -> Self {
         Self {
             gate,
+            slow,
             raise: 0.0,
             fits: Tried::default(),
             too_high: Tried::default(),
@@ -126,14 +130,20 @@ impl Jump {
     fn bounds(&self, budget: &TorqueBudget<'_>, down: bool) -> Bounds {
         let highest = self.gate.rise.max(self.gate.fall) + self.raise;
         let bounds = budget.lift(highest, down);
+        let speed = if self.slow {
+            bounds.speed.min(OF_A_PART * PLANNED)
+        } else {
+            bounds.speed
+        };
         if down {
             Bounds {
                 accelerate: bounds.brake,
                 brake: bounds.accelerate,
+                speed,
                 ..bounds
             }
         } else {
-            bounds
+            Bounds { speed, ..bounds }
         }
     }
 }

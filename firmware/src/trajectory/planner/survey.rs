@@ -8,6 +8,7 @@ use crate::mechanics::math::{clamp, least};
 use crate::trajectory::path::{Path, check_limits};
 use crate::trajectory::profile::{Bounds, HalfBounds};
 use crate::trajectory::request::from_ik;
+use crate::trajectory::tool_speed::{OF_A_PART, PLANNED, along};
 use crate::trajectory::torque_budget::TorqueBudget;
 
 impl Planner {
@@ -62,6 +63,12 @@ impl Planner {
             self.bounds.speed = 0.0;
             self.stage = Stage::Compose { round: ROUNDS };
         } else {
+            if self.slow_tool {
+                let part = if self.jump.is_some() { OF_A_PART } else { 1.0 };
+                let (path, geometry) = (&self.draft.path, &budget.arm.geometry);
+                let speed = along(path, geometry, part * PLANNED);
+                self.bounds.speed = self.bounds.speed.min(speed);
+            }
             self.stage = Stage::Rest { place: 0 };
         }
         Ok(())

@@ -20,6 +20,9 @@
 //! | a drive without power for 2 samples or more | 4 samples | the next feedback says so, and one sample to answer |
 //! | the clock of the drives stands still for 9 samples or more | 8 samples | no feedback, so no commands: the drives let go by a clock of their own |
 //! | a clock within 100 ppm, as every crystal is | the same as without it | nobody else counts on a time |
+//! | a foreign node sends a right frame of the controller for 17 samples or more | 16 samples | the controller hears it; on the beat of its own frames only after 32 attempts |
+//! | heartbeats of drives or operator gone for up to 100 ms | the same as without it | the next one is there after 200 ms at most |
+//! | the same for 350 ms or more; the operator silent for as long | 250 ms and 4 samples | one that was heard is waited for so long |
 //! | nobody tells a CAN controller to recover | the same as without it | nothing by itself: only after a bus-off |
 //!
 //! Whatever else breaks is judged by its effect: see [`super::bounds`].
@@ -32,7 +35,7 @@ use super::bounds::FOLLOWING_ERROR;
 use super::spells::Spell;
 use crate::bus::ErrorKind;
 use crate::clock::ClockDefect;
-use crate::faults::{FrameFault, What};
+use crate::faults::{Disguise, FrameFault, What};
 use crate::plant::defect::{EncoderDefect, MotorDefect};
 
 /// Noise of a sound encoder, rad and m: two of its counts at the shoulder.
@@ -80,7 +83,23 @@ fn of(fault: &Spell, period: Period) -> Expected {
             Expected::Either
         }
     };
+    // A heartbeat comes every 100 ms, and is waited for for 250.
+    let of_heart = || {
+        if lasts <= Duration::from_millis(100) {
+            Expected::Survived
+        } else if lasts >= Duration::from_millis(350) {
+            Expected::DetectedBy(fault.from + Duration::from_millis(250) + samples(4))
+        } else {
+            Expected::Either
+        }
+    };
     match fault.what {
+        What::Silent(Node::Operator) => no_survival(of_heart()),
+        What::Foreign(info, Disguise::Perfect)
+            if info.sender == Some(Node::Controller) && !is_rare(info.content) =>
+        {
+            no_survival(by_length(0, 17, 16))
+        }
         What::Silent(Node::Drives) => by_length(2, 9, 8),
         What::Silent(Node::Controller) | What::Dead(_) => no_survival(by_length(0, 9, 8)),
         What::Babbling(_) | What::Wires(_) => by_length(2, 9, 8),
@@ -94,6 +113,10 @@ fn of(fault: &Spell, period: Period) -> Expected {
             (Content::Feedback, FrameFault::Replay(back)) if back >= 4 => {
                 no_survival(by_length(0, 5, 5))
             }
+            (
+                Content::Heartbeat(Node::Drives | Node::Operator),
+                FrameFault::Loss(1.0) | FrameFault::Corrupt(1.0),
+            ) => of_heart(),
             (Content::Command, FrameFault::Loss(1.0) | FrameFault::Corrupt(1.0)) => {
                 by_length(3, 9, 8)
             }
@@ -117,6 +140,14 @@ fn of(fault: &Spell, period: Period) -> Expected {
         What::Encoder(_, EncoderDefect::Noise(most)) if most <= SOUND_NOISE => Expected::Survived,
         _ => Expected::Either,
     }
+}
+
+/// What a foreign node may never have heard, and cannot repeat.
+fn is_rare(content: Content) -> bool {
+    matches!(
+        content,
+        Content::Emergency(_) | Content::ParameterRequest(_) | Content::ParameterReply(_)
+    )
 }
 
 /// A short one may be survived, but need not.
@@ -159,6 +190,11 @@ pub(super) fn is_taken(period: Period) -> Duration {
 pub(super) fn stops_under_control(cause: Cause) -> bool {
     matches!(
         cause,
-        Cause::FeedbackLost | Cause::Reordered | Cause::Corrupted | Cause::SoftLimit | Cause::EStop
+        Cause::FeedbackLost
+            | Cause::OperatorSilent
+            | Cause::Reordered
+            | Cause::Corrupted
+            | Cause::SoftLimit
+            | Cause::EStop
     )
 }

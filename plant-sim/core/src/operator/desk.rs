@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{Message, Mode, MotionRequest, Outcome};
+use protocol::messages::{Message, Mode, MotionRequest, Operation, Outcome};
 use protocol::time::Instant;
 
 use super::program::{Action, Program, announcement};
@@ -19,6 +19,8 @@ use crate::world::{CellEvent, World};
 pub enum Order {
     /// A request to the controller.
     Request(MotionRequest),
+    /// The same, to keep on only while a button is held: not in automatic operation, where it would go on by itself.
+    Jog(MotionRequest),
     /// Carry this, announced to the controller; the gripper takes it when the controller has accepted it.
     Carry(PayloadSpec),
     /// Press the emergency stop.
@@ -31,7 +33,7 @@ impl Order {
     /// Name, lower case with hyphens.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Request(request) => request.name(),
+            Self::Request(request) | Self::Jog(request) => request.name(),
             Self::Carry(_) => "set-payload",
             Self::EmergencyStop => "emergency-stop",
             Self::Scenario => "scenario",
@@ -115,19 +117,30 @@ impl Desk {
     fn obey(&mut self, now: Instant, order: Order, out: &mut Outbox) {
         let (request, carry) = match order {
             Order::Request(request) => (request, None),
+            Order::Jog(_) if !self.is_manual() => {
+                let text = "jog: moves are held in manual operation alone; choose it first";
+                return self.answer(now, false, text.into());
+            }
+            Order::Jog(request) => (request, None),
             Order::Carry(payload) => (announcement(&payload), Some(payload)),
             Order::EmergencyStop => {
-                self.scripted = false;
+                self.interrupt();
                 let frame = self.operator.begin(&Action::EmergencyStop);
                 out.extend(frame.map(|frame| (now, frame)));
                 return self.answer(now, true, format!("{}: sent", order.name()));
             }
             Order::Scenario => {
-                self.scripted = false;
+                self.interrupt();
                 return self.again(now);
             }
         };
-        self.scripted &= matches!(request, MotionRequest::SetOverride { .. });
+        if request == MotionRequest::Hold {
+            out.extend(self.operator.hold().map(|frame| (now, frame)));
+            return;
+        }
+        if !matches!(request, MotionRequest::SetOverride { .. }) {
+            self.interrupt();
+        }
         let Some(frame) = self.operator.send(request) else {
             let text = format!("{}: a value that no frame can carry", order.name());
             return self.answer(now, false, text);
@@ -143,9 +156,30 @@ impl Desk {
         });
     }
 
+    /// Whether the controller is in manual operation, and not asked for another.
+    fn is_manual(&self) -> bool {
+        let changes = |open: &Open| matches!(open.request, MotionRequest::SetOperation { .. });
+        let state = self.operator.state;
+        state.is_some_and(|state| state.operation == Operation::Manual)
+            && !self.open.iter().any(changes)
+    }
+
+    /// The scenario does not go on, and nobody holds its moves.
+    fn interrupt(&mut self) {
+        self.scripted = false;
+        self.operator.button.press(false);
+    }
+
     /// Begins the scenario again, from where the controller is.
     fn again(&mut self, now: Instant) {
         let program = Program::new(&self.scenario).staying();
+        let wanted = self.scenario.operation.code();
+        let operation = self.operator.state.map(|state| state.operation);
+        if let Some(operation) = operation.filter(|operation| *operation != wanted) {
+            let text =
+                format!("scenario: the arm is in {operation} operation; choose {wanted} first");
+            return self.answer(now, false, text);
+        }
         let program = match self.operator.state.map(|state| state.mode) {
             Some(Mode::Ready) => program,
             Some(Mode::Enabled) => program.of_cycles(),
@@ -267,11 +301,11 @@ impl Peer for Desk {
                 }
             }
             None => {
-                self.operator.next = now + self.operator.period.duration();
+                self.operator.tick(now, out);
                 if let Some(order) = self.orders.pop_front() {
                     // The controller treats an operator's first request as a possible replay.
                     let first = self.operator.sequence == 0;
-                    if first && matches!(order, Order::Request(_) | Order::Carry(_)) {
+                    if first && !matches!(order, Order::EmergencyStop | Order::Scenario) {
                         self.orders.push_front(order);
                         self.obey(now, Order::Request(MotionRequest::Stop), out);
                     } else {

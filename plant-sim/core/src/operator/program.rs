@@ -6,7 +6,7 @@ use protocol::messages::{Mode, MotionRequest};
 use protocol::time::Duration;
 
 use super::CellEvent;
-use crate::scenario::{Override, PayloadSpec, Scenario, Source, Step};
+use crate::scenario::{Override, PayloadSpec, Release, Scenario, Source, Step};
 use crate::world::Spot;
 
 /// Wait after enabling, until brake and observer have settled.
@@ -18,6 +18,8 @@ pub(crate) enum Action {
     Hello,
     Request(MotionRequest),
     EmergencyStop,
+    /// Hold moves from now on, or let go of them.
+    Hold(bool),
     WaitMode(Mode),
     WaitArrived,
     Dwell(Duration),
@@ -34,7 +36,9 @@ impl Action {
             }
             Self::WaitMode(mode) => format!("state {mode}"),
             Self::WaitArrived => "end of the move".into(),
-            Self::EmergencyStop | Self::Dwell(_) | Self::Cell(_) => "end of a dwell".into(),
+            Self::EmergencyStop | Self::Hold(_) | Self::Dwell(_) | Self::Cell(_) => {
+                "end of a dwell".into()
+            }
         }
     }
 }
@@ -122,6 +126,10 @@ impl Program {
                 compensation: scenario.law.compensation,
             }),
         ];
+        if !scenario.operation.is_automatic() {
+            let operation = scenario.operation.code();
+            actions.push(Action::Request(MotionRequest::SetOperation { operation }));
+        }
         if let Some(gains) = &scenario.gains {
             let [bandwidth, damping, observer] = gains
                 .each((1.0 / scenario.rate_hz) as f32)
@@ -141,6 +149,13 @@ impl Program {
             Action::Dwell(SETTLING),
         ]);
         self.put(None, actions);
+    }
+
+    /// Presses the button of manual operation, or lets go of it.
+    fn hold(&mut self, pressed: bool) {
+        if !self.scenario.operation.is_automatic() {
+            self.put(None, [Action::Hold(pressed)]);
+        }
     }
 
     /// One step of a cycle.
@@ -175,6 +190,12 @@ impl Program {
                 Action::Dwell(Duration::from_seconds(*after)),
                 Action::Request(MotionRequest::SetOverride { pace: *to as f32 }),
             ],
+            Step::Release(Release { after, lasts }) => vec![
+                Action::Dwell(Duration::from_seconds(*after)),
+                Action::Hold(false),
+                Action::Dwell(Duration::from_seconds(*lasts)),
+                Action::Hold(true),
+            ],
             Step::Estop(seconds) => vec![
                 Action::Dwell(Duration::from_seconds(*seconds)),
                 Action::EmergencyStop,
@@ -208,6 +229,7 @@ impl Program {
             Part::Step(cycle, index) => {
                 let last = self.scenario.cycle.len();
                 if index == 0 {
+                    self.hold(true);
                     self.put(None, [Action::Cell(CellEvent::BeginCycle)]);
                 }
                 if let Some(step) = self.scenario.cycle.get(index).copied() {
@@ -229,6 +251,7 @@ impl Program {
                     });
                     self.put(spot, [Action::WaitArrived]);
                     self.put(None, [Action::Cell(CellEvent::EndCycle)]);
+                    self.hold(false);
                     Part::Step(cycle + 1, 0)
                 }
             }

@@ -10,7 +10,7 @@ use protocol::time::{Duration, Period};
 use toml::de::{DeTable, DeValue};
 
 use super::{
-    GainsSpec, Joints, Jump, Line, MAX_CYCLES, Override, PayloadSpec, Place, Scenario,
+    GainsSpec, Joints, Jump, Line, MAX_CYCLES, Override, PayloadSpec, Place, Release, Scenario,
     ScenarioError, Step, check_rate,
 };
 use crate::allowed::schema::Each;
@@ -92,6 +92,14 @@ impl Scenario {
                     findings.held(held.take());
                 }
                 Step::Stop(_) | Step::Estop(_) => held = None,
+                Step::Release(Release { after, .. }) if self.operation.is_automatic() => {
+                    findings.wrong(
+                        &format!("{key}.release.after"),
+                        after,
+                        "with operation = \"manual\", in which moves are held",
+                    );
+                }
+                Step::Release(_) => {}
                 Step::Jump(_) | Step::Line(_) | Step::Joints(_) => {}
             }
         }
@@ -276,6 +284,10 @@ impl<'a> Findings<'a> {
                     let allowed = format!("0, which holds the arm, or {MOVING_PACE}");
                     self.wrong(&format!("{key}.override.to"), to, allowed);
                 }
+            }
+            Step::Release(Release { after, lasts }) => {
+                self.number(&format!("{key}.release.after"), *after, SECONDS);
+                self.number(&format!("{key}.release.for"), *lasts, SECONDS);
             }
             Step::Estop(seconds) => self.number(&format!("{key}.estop"), *seconds, SECONDS),
             Step::Pick(payload) => {

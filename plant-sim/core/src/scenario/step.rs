@@ -25,6 +25,8 @@ pub enum Step {
     Stop(#[schemars(transform = by(check::SECONDS))] f64),
     /// Some seconds after the last move was accepted, set the speed override.
     Override(Override),
+    /// In manual operation: some seconds after the last move was accepted, let go of the button, for some seconds.
+    Release(Release),
     /// This many seconds after the last move was accepted, press the emergency stop.
     Estop(#[schemars(transform = by(check::SECONDS))] f64),
     /// Take a payload and announce it.
@@ -43,6 +45,7 @@ impl Step {
             Self::Dwell(_) => "dwell",
             Self::Stop(_) => "stop",
             Self::Override(_) => "override",
+            Self::Release(_) => "release",
             Self::Estop(_) => "estop",
             Self::Pick(_) => "pick",
             Self::Place {} => "place",
@@ -143,6 +146,19 @@ pub struct Override {
     /// same cycle raises it.
     #[schemars(transform = by(check::PACE))]
     pub to: f64,
+}
+
+/// Nobody holds the button of manual operation: the arm waits on its path until it is held again.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Release {
+    /// Seconds after the last move was accepted.
+    #[schemars(transform = by(check::SECONDS))]
+    pub after: f64,
+    /// Seconds until the button is held again.
+    #[serde(rename = "for")]
+    #[schemars(transform = by(check::SECONDS))]
+    pub lasts: f64,
 }
 
 impl Jump {

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use oorandom::Rand64;
 use sim::model::RobotModel;
 use sim::plant::kinematics::{Pose, Solution, inverse};
-use sim::scenario::{Elbow, Ending, Jump, Mismatch, PayloadSpec, Scenario, Step};
+use sim::scenario::{Elbow, Ending, Jump, Mismatch, OperationName, PayloadSpec, Scenario, Step};
 use sim::text::Source;
 
 use super::super::gate::{DWELL, law};
@@ -159,6 +159,7 @@ impl Gate {
             about: None,
             cycles: CYCLES,
             rate_hz: self.rate_hz,
+            operation: OperationName::default(),
             law: law(),
             gains: None,
             start,

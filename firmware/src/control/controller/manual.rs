@@ -1,0 +1,87 @@
+//! Manual operation: moves go on only while they are held, and slowly (ISO 10218-1).
+
+use nalgebra::Vector4;
+use protocol::messages::{Cause, Fault, FaultAxis, Operation, Refusal, RefusalReason};
+
+use super::Controller;
+use super::requests::Answer;
+use crate::control::states::State;
+use crate::trajectory::tool_speed;
+
+impl Controller {
+    /// How the arm is operated.
+    pub fn operation(&self) -> Operation {
+        self.operation
+    }
+
+    /// Operates the arm like this from now on. Nothing moves, and nothing is about to.
+    pub(super) fn operate_as(&mut self, operation: Operation) {
+        self.operation = operation;
+        self.held = 0;
+        self.too_fast = 0;
+        let is_manual = operation == Operation::Manual;
+        self.queue.set_held(is_manual.then_some(false));
+    }
+
+    /// Lets moves go on for another hold time.
+    pub(super) fn hold(&mut self) -> Result<Answer, Refusal> {
+        match self.state {
+            _ if self.operation == Operation::Automatic => {
+                return Err(Refusal::because(RefusalReason::WrongState));
+            }
+            State::Enabled | State::Moving => {
+                self.held = (self.setup.hold_time / self.config.period.seconds() + 0.5) as u16;
+                self.queue.set_held(Some(true));
+            }
+            // It comes to rest first.
+            State::QuickStop => {}
+            _ => return Err(Refusal::because(RefusalReason::NotEnabled)),
+        }
+        Ok(Answer::Never)
+    }
+
+    /// Counts down the time of the last hold.
+    pub(super) fn loosen(&mut self, steps: u32) {
+        if self.held > 0 {
+            self.held = u32::from(self.held).saturating_sub(steps) as u16;
+            if self.held == 0 {
+                self.queue.set_held(Some(false));
+            }
+        }
+    }
+
+    /// Nobody holds a move any more.
+    pub(super) fn let_go(&mut self) {
+        self.loosen(u32::MAX);
+    }
+
+    /// Judges the velocity of the flange, measured: x, y, z in m/s, yaw in rad/s.
+    #[inline(never)]
+    pub(super) fn watch_tool(&mut self, velocity: &Vector4<f32>) {
+        let speed = tool_speed::of(velocity);
+        if speed <= tool_speed::LIMIT {
+            self.too_fast = 0;
+            return;
+        }
+        self.too_fast = self.too_fast.saturating_add(1);
+        if u32::from(self.too_fast) >= self.setup.monitor.samples {
+            self.too_fast = 0;
+            let fault = Fault::value(Cause::OverSpeed, speed, tool_speed::LIMIT);
+            let axis = FaultAxis::Tool;
+            self.fail(Fault { axis, ..fault });
+        }
+    }
+
+    /// Whether an axis beyond its range is on its way back, or stands: in manual operation that frees it.
+    // Out of line: rare.
+    #[inline(never)]
+    pub(super) fn is_freed(&self, q: &Vector4<f32>) -> bool {
+        let limits = &self.config.arm.limits;
+        let qd = &self.setpoint.reference.qd;
+        let inward = |((q, qd), (lower, upper)): ((&f32, &f32), (&f32, &f32))| {
+            !(q > upper && *qd > 0.0 || q < lower && *qd < 0.0)
+        };
+        let limits = limits.lower.iter().zip(limits.upper.iter());
+        self.operation == Operation::Manual && q.iter().zip(qd.iter()).zip(limits).all(inward)
+    }
+}

@@ -1,0 +1,129 @@
+//! What the other nodes of the bus do wrong: bad frames, silence, and the place of this one.
+
+use protocol::codec::{self, DecodeError};
+use protocol::e2e::{Profile, Receiver};
+use protocol::frame::CanFrame;
+use protocol::messages::{Cause, Fault, Message, Node as Name};
+use protocol::parameters::Store as _;
+use protocol::table;
+use protocol::time::{Duration, Instant};
+
+use super::Node;
+
+/// The heartbeat of another node. As CiA 301 has it, it is watched from the first one on that was heard.
+#[derive(Clone, Debug)]
+pub(super) struct Pulse {
+    receiver: Receiver,
+    /// Number of the newest sample at the newest heartbeat.
+    last: u32,
+    is_watched: bool,
+}
+
+impl Pulse {
+    /// Nothing has been heard.
+    pub(super) fn new() -> Self {
+        Self {
+            receiver: Receiver::new(Profile::Classical),
+            last: 0,
+            is_watched: false,
+        }
+    }
+
+    fn forget(&mut self) {
+        self.receiver.reset();
+        self.is_watched = false;
+    }
+}
+
+impl Node {
+    /// A heartbeat of another node.
+    // Out of line: rare.
+    #[inline(never)]
+    pub(super) fn hear(&mut self, name: Name, counter: u8) {
+        let newest = self.newest.map(|(sample, _)| sample);
+        let pulse = match name {
+            Name::Drives => &mut self.drives,
+            Name::Operator => &mut self.operator,
+            Name::Controller => return,
+        };
+        let verdict = pulse.receiver.check(counter);
+        if let Some(newest) = newest
+            && verdict.is_new()
+        {
+            (pulse.last, pulse.is_watched) = (newest, true);
+        }
+        self.accept(verdict);
+    }
+
+    /// Whether the others have given a sign of life, at a sample of this number. Counted in samples, so that the same frames lead
+    /// to the same torques whenever they arrive; feedback that stays out is [another matter](Self::guard).
+    pub(super) fn listen(&mut self, sample: u32) {
+        for (pulse, cause) in [
+            (&mut self.drives, Cause::PeerSilent),
+            (&mut self.operator, Cause::OperatorSilent),
+        ] {
+            if !pulse.is_watched {
+                continue;
+            }
+            let age = sample.wrapping_sub(pulse.last) as f32 * self.controller.period();
+            let timeout = self.controller.setup().heartbeat_timeout;
+            if age > timeout {
+                pulse.forget();
+                self.controller
+                    .fail(Fault::value(cause, age * 1e3, timeout * 1e3));
+            }
+        }
+    }
+
+    pub(super) fn reject(&mut self, error: DecodeError, frame: &CanFrame) {
+        self.received.refuse(&error);
+        if table::FEEDBACK.identifies(frame) {
+            self.suspect(match error {
+                DecodeError::Value(_) | DecodeError::Malformed | DecodeError::NotCanonical => {
+                    Cause::BadValue
+                }
+                _ => Cause::Corrupted,
+            });
+        }
+    }
+
+    /// Somebody else sends what only this node sends, and no node receives its own frames: the drives and the operator may
+    /// believe either.
+    // Out of line: rare.
+    #[inline(never)]
+    pub(super) fn meet(&mut self, message: &Message) {
+        let id = f32::from(codec::info_of(message).id);
+        self.controller
+            .fail(Fault::value(Cause::DuplicateNode, id, 0.0));
+    }
+
+    /// Counts bad feedback frames; several in a row stop the arm.
+    pub(super) fn suspect(&mut self, cause: Cause) {
+        self.bad_feedback = self.bad_feedback.saturating_add(1);
+        if u32::from(self.bad_feedback) >= self.controller.setup().bad_frames {
+            let frames = f32::from(self.bad_feedback);
+            self.bad_feedback = 0;
+            self.controller.fail(Fault::value(cause, frames, 0.0));
+        }
+    }
+
+    /// Checks the age of the feedback.
+    pub(super) fn guard(&mut self, now: Instant) {
+        let Some((_, arrived)) = self.newest else {
+            return;
+        };
+        let age = now.since(arrived);
+        let timeout = self.controller.setup().feedback_timeout;
+        if age > Duration::from_micros(u64::from((timeout * 1e6) as u32)) {
+            let age_ms = age.nanos() as f32 * 1e-6;
+            self.controller
+                .fail(Fault::value(Cause::PeerSilent, age_ms, timeout * 1e3));
+            self.newest = None;
+            self.feedback.reset();
+            self.drives.forget();
+            self.operator.forget();
+            self.drives_parameter.reset();
+            self.same_schema = false;
+        }
+    }
+}

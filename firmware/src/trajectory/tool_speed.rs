@@ -1,0 +1,64 @@
+//! The speed of the tool: what manual operation limits.
+//!
+//! A tool is not known, so it is whatever lies within [`REACH`] of the axis of the flange. Where the flange moves at v horizontally and
+//! u vertically, and turns at w, none of its points is faster than sqrt((|v| + REACH |w|)² + u²), and some may be.
+
+use nalgebra::Vector4;
+
+use super::path::Path;
+use crate::mechanics::arm::Geometry;
+use crate::mechanics::math::{hypot, sin_cos, sqrt};
+
+/// Greatest speed of the tool in manual operation, m/s (ISO 10218-1).
+pub const LIMIT: f32 = 0.25;
+/// What a move may use of it, m/s; the rest is for the error of following it.
+pub const PLANNED: f32 = 0.9 * LIMIT;
+/// What each part of a jump may use of that: its strokes and its travel overlap.
+pub(super) const OF_A_PART: f32 = core::f32::consts::FRAC_1_SQRT_2;
+/// How far from the axis of the flange a point of the tool may be, m.
+pub const REACH: f32 = 0.1;
+
+/// Bound of the speed of the tool for this velocity of the flange: x, y, z in m/s, yaw in rad/s.
+pub fn of(velocity: &Vector4<f32>) -> f32 {
+    let across = hypot(velocity.x, velocity.y) + REACH * velocity.w.abs();
+    hypot(across, velocity.z)
+}
+
+/// The speed along a path, 1/s, at which the tool is nowhere on it faster than `tool`, m/s; infinite where the tool does not move.
+#[inline(never)]
+pub(super) fn along(path: &Path, geometry: &Geometry, tool: f32) -> f32 {
+    let (horizontal, vertical, turning) = match path {
+        Path::Joint { start, delta } => (
+            horizontal(geometry, start.y, delta),
+            delta.z,
+            delta.x + delta.y - delta.w,
+        ),
+        Path::Line { delta, .. } => (hypot(delta.x, delta.y), delta.z, delta.w),
+    };
+    tool / hypot(horizontal + REACH * turning.abs(), vertical)
+}
+
+/// Greatest horizontal speed of the flange per unit along a straight path in joint space, m. The law of cosines: the two arms turn at
+/// constant rates, and their velocities meet at the angle of the elbow, which goes one way.
+fn horizontal(geometry: &Geometry, elbow: f32, delta: &Vector4<f32>) -> f32 {
+    let (first, second) = (geometry.a1 * delta.x, geometry.a2 * (delta.x + delta.y));
+    let product = first * second;
+    let (begin, end) = (elbow, elbow + delta.y);
+    let (_, cosine) = sin_cos(begin);
+    let (_, other) = sin_cos(end);
+    let greatest = if product < 0.0 {
+        // Folded, or as near to that as the elbow comes.
+        if begin.abs().max(end.abs()) >= core::f32::consts::PI {
+            -1.0
+        } else {
+            cosine.min(other)
+        }
+    } else if begin * end <= 0.0 {
+        // It passes through the stretched arm.
+        1.0
+    } else {
+        cosine.max(other)
+    };
+    let squared = first * first + second * second + 2.0 * product * greatest;
+    sqrt(squared.max(0.0))
+}

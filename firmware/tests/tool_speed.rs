@@ -1,0 +1,134 @@
+//! Moves for manual operation, against points of the tool along them.
+
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
+mod common;
+
+use common::planned::{joints, plan_with, robot, two_kg};
+use firmware::mechanics::arm::ArmModel;
+use firmware::mechanics::kinematics::{self, Elbow, Pose};
+use firmware::trajectory::planner::Planner;
+use firmware::trajectory::request::Target;
+use firmware::trajectory::tool_speed::{PLANNED, REACH};
+use firmware::trajectory::{Reference, Trajectory};
+use nalgebra::Vector4;
+use proptest::prelude::*;
+use protocol::messages::Posture;
+
+/// Velocities of points of the tool, m/s: a chain of two arms and a turning flange, differentiated by hand in f64.
+fn points(arm: &ArmModel, Reference { q, qd, .. }: &Reference) -> f64 {
+    let [one, two, wrist] = [0, 1, 3].map(|axis| f64::from(q[axis]));
+    let [w1, w2, u, w4] = [0, 1, 2, 3].map(|axis| f64::from(qd[axis]));
+    let (a, b) = (f64::from(arm.geometry.a1), f64::from(arm.geometry.a2));
+    let around = |k: u8| {
+        let yaw = one + two - wrist + f64::from(k) * std::f64::consts::TAU / 64.0;
+        let (reach, turn) = (f64::from(REACH), w1 + w2 - w4);
+        let x = -a * w1 * one.sin() - b * (w1 + w2) * (one + two).sin() - reach * turn * yaw.sin();
+        let y = a * w1 * one.cos() + b * (w1 + w2) * (one + two).cos() + reach * turn * yaw.cos();
+        (x * x + y * y + u * u).sqrt()
+    };
+    (0..64).map(around).fold(0.0, f64::max)
+}
+
+/// Greatest speed of a point of the tool at instants along the move.
+fn fastest(arm: &ArmModel, trajectory: &Trajectory) -> f64 {
+    let steps = 2000u16;
+    let at = |k: u16| {
+        let t = trajectory.duration() * f32::from(k) / f32::from(steps);
+        points(arm, &trajectory.at(arm, t).unwrap())
+    };
+    (0..=steps).map(at).fold(0.0, f64::max)
+}
+
+/// The move as it is planned for manual operation, with two kilograms.
+fn slow(arm: &ArmModel, from: &Vector4<f32>, target: Target, speed: f32) -> Option<Trajectory> {
+    let mut planner = Planner::new();
+    planner.keep_tool_slow(true);
+    plan_with(planner, arm, &two_kg(), from, target, speed).ok()
+}
+
+/// m/s, and what rounding may add to it.
+fn limit() -> f64 {
+    f64::from(PLANNED) * (1.0 + 1e-5)
+}
+
+fn posed(arm: &ArmModel, radius: f32, angle: f32, z: f32) -> Option<(Pose, Vector4<f32>)> {
+    let (y, x) = angle.sin_cos();
+    let pose = Pose {
+        x: radius * x,
+        y: radius * y,
+        z,
+        yaw: angle,
+    };
+    let q = kinematics::inverse(arm, &pose, Elbow::Positive, &Vector4::zeros());
+    q.ok().map(|q| (pose, q))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn no_point_is_fast_on_a_move_in_joint_space(arm in robot(), from in joints(), to in joints(), speed in 0.05f32..1.0) {
+        let trajectory = slow(&arm, &from, Target::Joints(to), speed).expect("it can be planned");
+        let found = fastest(&arm, &trajectory);
+        prop_assert!(found <= limit() * f64::from(speed), "{found}");
+    }
+
+    #[test]
+    fn nor_on_a_jump(
+        arm in robot(),
+        r0 in 0.4f32..0.95, a0 in -1.0f32..1.0, r1 in 0.4f32..0.95, a1 in -1.0f32..1.0, rise in 0.0f32..0.1,
+    ) {
+        let (Some((_, from)), Some((pose, _))) = (posed(&arm, r0, a0, -0.3), posed(&arm, r1, a1, -0.3)) else {
+            return Ok(());
+        };
+        let target = Target::Jump { pose, posture: Posture::NEAREST, top: -0.3 + rise, clearance: 0.0 };
+        let Some(trajectory) = slow(&arm, &from, target, 1.0) else { return Ok(()) };
+        let found = fastest(&arm, &trajectory);
+        prop_assert!(found <= limit(), "{found}");
+    }
+
+    /// And there the limit is used: the flange has the same speed at every place of a line, which is long enough here to get to it.
+    #[test]
+    fn nor_on_a_line(
+        arm in robot(), r0 in 0.4f32..0.6, a0 in -0.5f32..0.5, r1 in 0.7f32..0.9, a1 in -0.5f32..0.5, z in -0.3f32..-0.2,
+    ) {
+        let (Some((_, from)), Some((pose, _))) = (posed(&arm, r0, a0, -0.3), posed(&arm, r1, a1, z)) else {
+            return Ok(());
+        };
+        let Some(trajectory) = slow(&arm, &from, Target::Line(pose, Posture::NEAREST), 1.0) else {
+            return Ok(());
+        };
+        let found = fastest(&arm, &trajectory);
+        // Some are slower for the rate of a torque at their ends.
+        prop_assert!(found <= limit() + 1e-5 && found >= 0.9 * limit(), "{found}");
+    }
+}
+
+/// An elbow that stretches or folds on the way is fastest, or slowest, there: the limit is used to a good part on such ways as well.
+#[test]
+fn the_stretched_arm_counts_where_it_is_passed() {
+    let arm = firmware::mechanics::arm::IRB_930;
+    for (from, to) in [
+        // Both arms turn the same way, and the elbow passes zero.
+        ([-0.5, -1.0, 0.1, 0.0], [0.5, 1.0, 0.1, 0.0]),
+        // Against each other, and it does not.
+        ([0.5, -2.0, 0.1, 0.0], [1.0, -0.2, 0.1, 0.0]),
+        ([1.0, 0.3, 0.1, 0.0], [0.0, 2.4, 0.1, 0.0]),
+        ([0.0, 1.0, 0.1, 0.0], [0.0, 1.0, 0.3, 3.0]),
+    ] {
+        let (from, to) = (Vector4::from(from), Vector4::from(to));
+        let trajectory = slow(&arm, &from, Target::Joints(to), 1.0).unwrap();
+        let found = fastest(&arm, &trajectory);
+        assert!(
+            found <= limit() && found > 0.6 * limit(),
+            "{from} {to}: {found}"
+        );
+    }
+}

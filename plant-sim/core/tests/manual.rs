@@ -1,0 +1,199 @@
+//! Manual operation with the whole bench: whatever is asked for, held and let go of, the true tool stays slow, and stands where nobody
+//! holds it.
+
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
+#[path = "common/record.rs"]
+mod record;
+
+use std::fmt::Write;
+
+use oorandom::Rand64;
+use protocol::codec;
+use protocol::messages::{Cause, Message, Mode, MotionRequest, Operation};
+use record::{Record, run_of};
+use sim::observer::PlantState;
+use sim::plant::kinematics::wrap;
+use sim::scenario::Scenario;
+
+/// m/s of ISO 10218-1, at every point within so many m of the axis of the flange.
+const LIMIT: f64 = 0.25;
+const REACH: f64 = 0.1;
+
+/// A scenario of manual operation at this rate, with this payload in kg and these steps.
+fn scenario(rate: u32, payload: f64, steps: &str) -> Scenario {
+    let text = format!(
+        "name = \"manual\"\ncycles = 1\nrate_hz = {rate}\nlaw = \"computed-torque:observer\"\noperation = \"manual\"\n\
+         start = [0.5, 0.1, -0.27, 0.0]\n{}\n{steps}",
+        if payload > 0.0 {
+            format!(
+                "payload = {{ mass = {payload}, com_flange_frame = [0.0, 0.0, 0.05], inertia_com_diag = [0.02, 0.02, 0.02] }}"
+            )
+        } else {
+            String::new()
+        }
+    );
+    Scenario::parse(&text, "a test").unwrap()
+}
+
+/// The speed of the fastest point of the tool between two samples, m/s, by where it truly was.
+fn speed(a: &PlantState, b: &PlantState) -> f64 {
+    let [x, y, z] = [0, 1, 2].map(|i| b.tool[i] - a.tool[i]);
+    let turn = wrap(b.tool[3] - a.tool[3]).abs();
+    (x.hypot(y) + REACH * turn).hypot(z) / (b.t - a.t)
+}
+
+/// Times of the holds, s.
+fn holds(record: &Record) -> Vec<f64> {
+    let frames = record.frames.iter();
+    let holds = frames.filter(|(_, frame)| {
+        let message = codec::decode(frame).map(|received| received.message);
+        matches!(message, Ok(Message::Motion(motion)) if motion.request == MotionRequest::Hold)
+    });
+    holds.map(|(time, _)| time.seconds()).collect()
+}
+
+/// Random steps: moves of every kind, let go of at any time for any time.
+fn steps(random: &mut Rand64) -> String {
+    let mut text = String::new();
+    let mut number = |from: f64, to: f64| from + random.rand_float() * (to - from);
+    for _ in 0..4 {
+        let (radius, angle) = (number(0.4, 0.9), number(-1.2, 1.2));
+        let (x, y, z) = (
+            radius * angle.cos(),
+            radius * angle.sin(),
+            number(-0.35, -0.2),
+        );
+        let (yaw, speed) = (number(-3.0, 3.0), number(0.3, 1.0));
+        let to = format!("to = [{x}, {y}, {z}, {yaw}], speed = {speed}");
+        let step = match number(0.0, 3.0) as u8 {
+            0 => format!("jump = {{ {to}, top = {} }}", z.max(number(-0.25, -0.15))),
+            1 => format!(
+                "joints = {{ to = [{}, {}, {}, {}], speed = {speed} }}",
+                number(-1.5, 1.5),
+                number(0.3, 2.2),
+                number(0.05, 0.25),
+                number(-3.0, 3.0)
+            ),
+            _ => format!("jump = {{ {to}, top = {z} }}"),
+        };
+        let _ = writeln!(text, "[[cycle]]\n{step}");
+        for _ in 0..number(0.0, 3.0) as u8 {
+            let (after, lasts) = (number(0.0, 0.6), number(0.02, 0.6));
+            let _ = writeln!(
+                text,
+                "[[cycle]]\nrelease = {{ after = {after}, for = {lasts} }}"
+            );
+        }
+        if number(0.0, 1.0) < 0.3 {
+            let (after, to) = (number(0.0, 0.3), number(0.2, 1.0));
+            let _ = writeln!(
+                text,
+                "[[cycle]]\noverride = {{ after = {after}, to = {to} }}"
+            );
+        }
+    }
+    text
+}
+
+#[test]
+fn the_true_tool_stays_slow_and_stands_where_nobody_holds_it() {
+    let mut random = Rand64::new(11);
+    let (mut stood, mut fast) = (0, 0);
+    for k in 0..24 {
+        let rate = [500, 1000, 2000][k % 3];
+        let payload = [0.0, 2.0, 22.0][k / 3 % 3];
+        let text = steps(&mut random);
+        let (summary, record) = run_of(scenario(rate, payload, &text), &[], 0);
+        assert!(summary.completed, "{k}: {:?}\n{text}", summary.error);
+        let holds = holds(&record);
+        let mut fastest = 0.0f64;
+        for pair in record.truths.windows(2) {
+            let (before, now) = (&pair[0].plant, &pair[1].plant);
+            let speed = speed(before, now);
+            fastest = fastest.max(speed);
+            let at = holds.partition_point(|time| *time < before.t);
+            let last = at.checked_sub(1).map_or(f64::NEG_INFINITY, |at| holds[at]);
+            // 150 ms, and a tenth of a second to stop; what is left is less than a hundredth of the limit.
+            if now.t - last > 0.25 {
+                let creep = LIMIT / 100.0;
+                assert!(speed < creep, "case {k} at {} s: {speed}\n{text}", now.t);
+                stood += u32::from(pair[1].mind.mode == Mode::Moving);
+            }
+        }
+        assert!(fastest < LIMIT, "case {k}: {fastest}\n{text}");
+        fast += u32::from(fastest > 0.5 * LIMIT);
+    }
+    assert!(stood > 1000 && fast > 8, "{stood} {fast}");
+}
+
+/// The state says how the arm is operated, and that it waits.
+#[test]
+fn the_state_tells_the_operation() {
+    let text = "[[cycle]]\njump = { to = [0.7, -0.1, -0.27, 0.0], top = -0.25 }\n\
+                [[cycle]]\nrelease = { after = 0.3, for = 1.0 }\n";
+    let (summary, record) = run_of(scenario(1000, 2.0, text), &[], 0);
+    assert!(summary.completed, "{:?}", summary.error);
+    let states =
+        record
+            .frames
+            .iter()
+            .filter_map(|(_, frame)| match codec::decode(frame).ok()?.message {
+                Message::State(state) => Some(state),
+                _ => None,
+            });
+    let moving: Vec<_> = states.filter(|state| state.mode == Mode::Moving).collect();
+    assert!(
+        moving
+            .iter()
+            .all(|state| state.operation == Operation::Manual)
+    );
+    let waits = moving.iter().filter(|state| state.pace == 0).count();
+    // 1 s without 150 ms, 50 times a second.
+    assert!((38..=46).contains(&waits), "{waits}");
+}
+
+/// An operator who falls silent holds nothing: the arm waits first, and then the controller misses the operator.
+#[test]
+fn a_silent_operator_lets_go_first() {
+    let text = "[[cycle]]\njump = { to = [0.7, -0.1, -0.27, 0.0], top = -0.25 }\n";
+    let (summary, record) = run_of(scenario(1000, 2.0, text), &["operator:silent@0.6s"], 0);
+    assert!(!summary.completed && summary.at_rest);
+    let faults =
+        record
+            .frames
+            .iter()
+            .filter_map(|(time, frame)| match codec::decode(frame).ok()?.message {
+                Message::Emergency(_, emergency) => Some((time.seconds(), emergency.cause)),
+                _ => None,
+            });
+    let (time, cause) = faults.into_iter().next().unwrap();
+    assert_eq!(cause, Cause::OperatorSilent);
+    let before: Vec<_> = record
+        .truths
+        .iter()
+        .filter(|it| (time - 0.04..time).contains(&it.plant.t))
+        .collect();
+    assert!(
+        before.iter().all(|it| !it.plant.is_moving()),
+        "it stood by then"
+    );
+}
+
+/// A scenario lets go only where moves are held.
+#[test]
+fn a_release_in_automatic_operation_is_refused() {
+    let text = "name = \"a\"\ncycles = 1\nrate_hz = 1000\nlaw = \"computed-torque:observer\"\nstart = [0.5, 0.1, -0.27, 0.0]\n\
+                [[cycle]]\njump = { to = [0.7, -0.1, -0.27, 0.0], top = -0.25 }\n[[cycle]]\nrelease = { after = 0.3, for = 1.0 }\n";
+    let error = Scenario::parse(text, "a test").unwrap_err().to_string();
+    assert!(
+        error.contains("cycle[1].release.after") && error.contains("operation = \"manual\""),
+        "{error}"
+    );
+}
