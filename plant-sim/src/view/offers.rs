@@ -303,9 +303,8 @@ fn faults() -> Vec<Breakage> {
             value: kind.value.map(|value| Number {
                 least: value.least,
                 greatest: value.greatest,
-                step: 0.001,
-                // A hundredth of what is allowed can be seen and is no nonsense.
-                start: value.default.unwrap_or(value.greatest / 100.0),
+                step: value.step(),
+                start: value.moderate(),
                 unit: value.unit,
             }),
         })

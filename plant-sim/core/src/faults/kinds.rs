@@ -32,6 +32,24 @@ pub struct Value {
     pub unit: &'static str,
 }
 
+impl Value {
+    /// Between two values that a person may choose.
+    pub fn step(&self) -> f64 {
+        if self.whole { 1.0 } else { 0.001 }
+    }
+
+    /// One to begin with: a hundredth of what is allowed can be seen and is no nonsense.
+    pub fn moderate(&self) -> f64 {
+        let hundredth = self.greatest / 100.0;
+        let start = if self.whole {
+            hundredth.ceil()
+        } else {
+            hundredth
+        };
+        self.default.unwrap_or(start)
+    }
+}
+
 const SHARE: Value = Value {
     default: Some(1.0),
     ..value(0.0, 1.0, "share of the frames")
