@@ -10,14 +10,20 @@
 //! watch     the observer that measures a run
 //! load      torques over a cycle: what is left of it at a lower speed or with a pause
 //! group     means and worst of many rows
+//! others    gates at random, beside what the planner of before made of them
+//! limits    the observer that holds plans to the limits of the robot
+//! repeatability  a pose that is attained again and again
 //! text      tables for people, CSV
 //! picture   the same as SVG
 //! ```
 
 pub mod gate;
 mod group;
+mod limits;
 mod load;
+mod others;
 mod picture;
+mod repeatability;
 mod text;
 mod watch;
 
@@ -27,16 +33,21 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 use sim::model::RobotModel;
+use sim::observer::Observer;
 use sim::run::{in_process, with_controller};
 use sim::setup::RunConfig;
+use sim::summary::Summary;
 
 use crate::parallel;
 use crate::progress::Progress;
 use crate::qemu::{self, Qemu};
 use gate::Case;
 pub use group::Group;
+pub use limits::Peaks;
+pub use others::{Other, Others, Saving, Time};
 pub use picture::picture;
-pub use text::{csv, text};
+pub use repeatability::Repeatability;
+pub use text::{csv, other_csv, repeatability_csv, text};
 use watch::Watch;
 
 /// Rows for each thread between two signs of progress.
@@ -58,6 +69,10 @@ pub struct Report {
     pub mismatched: Vec<Row>,
     /// The same by payload, rate and mismatch, over the places.
     pub mismatched_groups: Vec<Group>,
+    /// Gates at random, beside what the planner of before made of them.
+    pub others: Others,
+    /// How well a pose is attained again and again, with noise of the encoders.
+    pub repeatability: Vec<Repeatability>,
 }
 
 /// One gate, there and back.
@@ -156,6 +171,28 @@ pub enum Controller {
     Qemu(PathBuf),
 }
 
+impl Controller {
+    /// Runs a scenario.
+    fn run(&self, config: &RunConfig, observer: &mut impl Observer) -> Result<Summary, String> {
+        let summary = match self {
+            Self::InProcess => in_process(config, observer),
+            Self::Qemu(image) => {
+                let options = qemu::Options {
+                    image: Some(image.clone()),
+                    ..qemu::Options::default()
+                };
+                let connect = |config| Qemu::start(config, &options);
+                with_controller(config, connect, &mut (), observer)
+            }
+        };
+        summary.map_err(|error| named(config, &error))
+    }
+}
+
+fn named(config: &RunConfig, error: &dyn std::fmt::Display) -> String {
+    format!("{}: {error}", config.scenario.name)
+}
+
 /// Runs the benchmark on `jobs` threads; the result does not depend on their number.
 ///
 /// # Errors
@@ -166,7 +203,9 @@ pub fn motion(
     jobs: NonZero<usize>,
 ) -> Result<Report, String> {
     let cases = gate::cases(extent);
-    let mut progress = Progress::of_rows(cases.len() as u64);
+    let others = others::count(extent);
+    let poses = repeatability::cases(extent);
+    let mut progress = Progress::of_rows((cases.len() + others + poses.len()) as u64);
     let mut rows = Vec::new();
     for batch in cases.chunks(BATCH * jobs.get()) {
         for row in parallel::map(batch, jobs, |case| measure(case, controller)) {
@@ -182,6 +221,8 @@ pub fn motion(
         law: gate::law().to_string(),
         groups: group::groups(&rows),
         mismatched_groups: group::groups(&mismatched),
+        others: others::others(others, controller, jobs, &mut progress)?,
+        repeatability: repeatability::measure(&poses, controller, jobs, &mut progress)?,
         rows,
         mismatched,
     })
@@ -190,14 +231,22 @@ pub fn motion(
 impl Report {
     /// Why the benchmark has failed, if it has: gates that should have been completed and were not.
     pub fn failure(&self) -> Option<String> {
-        let all = self.rows.iter().chain(&self.mismatched);
-        let faults: Vec<&Row> = all.filter(|row| row.has_failed()).collect();
+        let gates = self.rows.iter().chain(&self.mismatched);
+        let gates = gates.filter(|row| row.has_failed()).map(Row::ending);
+        let others = self.others.rows.iter().filter_map(Other::failure);
+        let poses = self.repeatability.iter().filter_map(Repeatability::failure);
+        let faults: Vec<String> = gates.chain(others).chain(poses).collect();
         let first = faults.first()?;
+        let all = [
+            self.rows.len(),
+            self.mismatched.len(),
+            self.others.gates,
+            self.repeatability.len(),
+        ];
         Some(format!(
-            "{} of {} gates were not completed that should have been; the first is {}",
+            "{} of {} gates were not completed that should have been; the first is {first}",
             faults.len(),
-            self.rows.len() + self.mismatched.len(),
-            first.ending()
+            all.iter().sum::<usize>(),
         ))
     }
 }
@@ -226,21 +275,9 @@ impl Row {
 /// Runs one case.
 fn measure(case: &Case, controller: &Controller) -> Result<Row, String> {
     let config = RunConfig::new(case.scenario());
-    let named = |error: &dyn std::fmt::Display| format!("{}: {error}", config.scenario.name);
-    let rig = config.rig().map_err(|error| named(&error))?;
-    let mut watch = Watch::new(case, &rig.actual);
-    let summary = match controller {
-        Controller::InProcess => in_process(&config, &mut watch),
-        Controller::Qemu(image) => {
-            let options = qemu::Options {
-                image: Some(image.clone()),
-                ..qemu::Options::default()
-            };
-            let connect = |config| Qemu::start(config, &options);
-            with_controller(&config, connect, &mut (), &mut watch)
-        }
-    };
-    let summary = summary.map_err(|error| named(&error))?;
+    let rig = config.rig().map_err(|error| named(&config, &error))?;
+    let mut watch = Watch::new(case.course(), &rig.actual);
+    let summary = controller.run(&config, &mut watch)?;
     let figures = match summary.error {
         None => watch.figures(case.gate.optimum_s, &summary),
         Some(_) => Figures::default(),
@@ -284,6 +321,8 @@ mod tests {
             groups: Vec::new(),
             mismatched: vec![row(1.2, Some("too heavy"))],
             mismatched_groups: Vec::new(),
+            others: Others::of(Vec::new()),
+            repeatability: Vec::new(),
         };
         assert_eq!(report(None).failure(), None);
         let why = report(Some("it broke")).failure().unwrap();

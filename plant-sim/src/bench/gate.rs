@@ -8,17 +8,18 @@ use sim::selection::LawChoice;
 use sim::text::Source;
 
 use super::Extent;
+use super::watch::Course;
 
 /// Half of the stroke, m.
 const HALF_STROKE: f64 = 0.15;
 /// Height of the flange at both ends, m.
 const Z: f64 = -0.25;
 /// How far the gate goes up, m.
-pub(super) const RISE: f64 = 0.025;
+const RISE: f64 = 0.025;
 /// Round trips of a run.
-pub(super) const CYCLES: u32 = 2;
+const CYCLES: u32 = 2;
 /// Rest at each end, in which the tool has to settle, s.
-const DWELL: f64 = 0.25;
+pub(super) const DWELL: f64 = 0.25;
 /// Control rates, Hz.
 const RATES: [f64; 2] = [1000.0, 2000.0];
 /// True friction over the one believed.
@@ -105,8 +106,23 @@ pub(super) fn cases(extent: Extent) -> Vec<Case> {
 }
 
 impl Case {
+    /// What a run is measured against.
+    pub(super) fn course(&self) -> Course {
+        let Self {
+            rate_hz, mismatch, ..
+        } = *self;
+        let payload = self.scenario().payload;
+        Course {
+            ends: self.ends(),
+            top: Z + RISE,
+            rate_hz,
+            payload: payload.map(|payload| payload.scaled(mismatch.payload)),
+            cycles: CYCLES,
+        }
+    }
+
     /// Both ends of the stroke: x, y, z, yaw.
-    pub(super) fn ends(&self) -> [[f64; 4]; 2] {
+    fn ends(&self) -> [[f64; 4]; 2] {
         let Gate {
             radius_m,
             stroke_deg,

@@ -188,6 +188,8 @@ mod tests {
             groups: Vec::new(),
             mismatched: Vec::new(),
             mismatched_groups: Vec::new(),
+            others: super::super::Others::of(Vec::new()),
+            repeatability: Vec::new(),
         };
         let bars: Vec<_> = elements(&picture(&report))
             .into_iter()

@@ -1,10 +1,12 @@
 //! The benchmark as tables: Markdown, which a terminal shows as well, and CSV.
 
+mod others;
+mod rows;
+
 use std::fmt::Write as _;
 
-use serde_json::Value;
-
-use super::{Figures, Group, Report, Row};
+use super::{Figures, Group, Repeatability, Report, Row};
+pub use rows::{csv, other_csv, repeatability_csv};
 
 /// Everything, for people: what is over all places first.
 pub fn text(report: &Report) -> String {
@@ -29,6 +31,8 @@ pub fn text(report: &Report) -> String {
     if let Some(row) = report.mismatched.iter().find(|row| row.fault.is_some()) {
         let _ = writeln!(text, "\nThe first fault of these: {}.", row.ending());
     }
+    text += &others::text(&report.others);
+    text += &repeatability(&report.repeatability);
     let rows = || report.rows.iter();
     let head = ["place", "payload kg", "rate Hz"];
     let of_row = |row: &Row| {
@@ -139,6 +143,33 @@ fn mismatched(group: &Group) -> Vec<String> {
     ]
 }
 
+/// The pose that is attained again and again.
+fn repeatability(rows: &[Repeatability]) -> String {
+    let head = [
+        "payload kg",
+        "rate Hz",
+        "cycles",
+        "mean mm",
+        "deviation mm",
+        "RP mm",
+        "AP mm",
+    ];
+    let cells = |row: &Repeatability| {
+        vec![
+            row.payload_kg.to_string(),
+            row.rate_hz.to_string(),
+            row.cycles.to_string(),
+            number(row.mean_mm, 5),
+            number(row.deviation_mm, 5),
+            number(row.repeatability_mm, 5),
+            number(row.accuracy_mm, 5),
+        ]
+    };
+    let about = "\nRepeatability of a pose after ISO 9283, each encoder off by up to a step in every reading: distances from the \
+                 barycentre, RP their mean and three deviations; AP is that of the barycentre from the pose.\n\n";
+    about.to_owned() + &table(&head, rows.iter().map(cells))
+}
+
 fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or("-".into(), |value| format!("{value:.decimals$}"))
 }
@@ -174,45 +205,4 @@ fn table(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
         text += &line(&row.iter().map(String::as_str).collect::<Vec<_>>());
     }
     text
-}
-
-/// Every row, with and without mismatch, under the keys that they have in JSON.
-///
-/// # Errors
-/// Never for numbers and texts.
-pub fn csv(report: &Report) -> Result<String, String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let mut header = false;
-    for row in report.rows.iter().chain(&report.mismatched) {
-        let keys = cells(row)?;
-        if !header {
-            let names = keys.iter().map(|(name, _)| name);
-            writer
-                .write_record(names)
-                .map_err(|error| error.to_string())?;
-            header = true;
-        }
-        let values = keys.iter().map(|(_, value)| value);
-        writer
-            .write_record(values)
-            .map_err(|error| error.to_string())?;
-    }
-    let bytes = writer.into_inner().map_err(|error| error.to_string())?;
-    String::from_utf8(bytes).map_err(|error| error.to_string())
-}
-
-/// Keys and values of a row; what is `null` in JSON is blank.
-fn cells(row: &Row) -> Result<Vec<(String, String)>, String> {
-    let Value::Object(keys) = serde_json::to_value(row).map_err(|error| error.to_string())? else {
-        return Err("a row is an object".into());
-    };
-    let cell = |value: Value| match value {
-        Value::Null => String::new(),
-        Value::String(text) => text,
-        other => other.to_string(),
-    };
-    Ok(keys
-        .into_iter()
-        .map(|(key, value)| (key, cell(value)))
-        .collect())
 }

@@ -8,11 +8,11 @@ use sim::model::{Payload, RobotModel};
 use sim::observer::{Observer, Truth};
 use sim::plant::arm::Arm;
 use sim::plant::drive::Drive;
+use sim::scenario::PayloadSpec;
 use sim::summary::Summary;
 use sim::world::CellEvent;
 
 use super::Figures;
-use super::gate::{CYCLES, Case, RISE};
 use super::load::Load;
 
 /// Offsets within which the tool has arrived, from coarse to fine.
@@ -22,6 +22,21 @@ const RADII: [Offset; 3] = [
     Offset::new(1e-5, 1e-4),
 ];
 
+/// A gate as a run passes it, there and back.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Course {
+    /// Both ends: x, y, z (m), yaw (rad).
+    pub(super) ends: [[f64; 4]; 2],
+    /// Height up to which it goes at least, m.
+    pub(super) top: f64,
+    /// Control rate, Hz.
+    pub(super) rate_hz: f64,
+    /// What the arm truly carries.
+    pub(super) payload: Option<PayloadSpec>,
+    /// Round trips.
+    pub(super) cycles: u32,
+}
+
 /// Measures a run, sample by sample.
 pub(super) struct Watch {
     robot: RobotModel,
@@ -29,7 +44,7 @@ pub(super) struct Watch {
     arm: Arm,
     drive: Drive,
     period: f64,
-    ends: [[f64; 4]; 2],
+    course: Course,
     /// Whether a cycle is under way.
     on: bool,
     /// Time of the last sample, and its efforts without dry friction.
@@ -67,17 +82,15 @@ struct Sums {
 }
 
 impl Watch {
-    /// For a run of `case` on `robot`, which is as it is and not as believed.
-    pub(super) fn new(case: &Case, robot: &RobotModel) -> Self {
-        let scenario = case.scenario();
-        let payload = scenario.payload;
-        let payload = payload.map(|spec| Payload::from(spec.scaled(case.mismatch.payload)));
+    /// For a run of `course` on `robot`, which is as it is and not as believed.
+    pub(super) fn new(course: Course, robot: &RobotModel) -> Self {
+        let payload = course.payload.map(Payload::from);
         Self {
             arm: Arm::new(robot, payload.as_ref()),
             drive: Drive::new(&robot.drive),
             robot: robot.clone(),
-            period: 1.0 / case.rate_hz,
-            ends: case.ends(),
+            period: 1.0 / course.rate_hz,
+            course,
             on: false,
             before: None,
             way: None,
@@ -91,7 +104,7 @@ impl Watch {
     /// What it comes to; `summary` has the rest.
     pub(super) fn figures(&self, optimum: f64, summary: &Summary) -> Figures {
         let greatest = |of_axes: [f64; 4]| of_axes.into_iter().fold(0.0, f64::max);
-        let cycles = f64::from(CYCLES);
+        let cycles = f64::from(self.course.cycles);
         let planned = self.sums.planned / cycles;
         let arrived = self.sums.arrived.unwrap_or_default();
         let [to_1, to_0_1, to_0_01] = arrived.map(|sum| sum.map(|sum| sum / cycles));
@@ -129,7 +142,7 @@ impl Watch {
         let moved = self.way.is_some_and(|way| way.ended.is_none());
         if moves && !moved {
             self.conclude();
-            let [a, b] = self.ends;
+            let [a, b] = self.course.ends;
             let (from, to) = if self.ways.is_multiple_of(2) {
                 (a, b)
             } else {
@@ -169,7 +182,12 @@ impl Watch {
         let (behind, ahead) = (across(tool, &way.from), across(tool, &way.to));
         let height = tool[2] - way.to[2];
         if moves {
-            let margin = height - behind.min(ahead).min(RISE);
+            let (near, away) = if behind < ahead {
+                (&way.from, behind)
+            } else {
+                (&way.to, ahead)
+            };
+            let margin = tool[2] - near[2] - away.min(self.course.top - near[2]);
             self.sums.margin = Some(self.sums.margin.map_or(margin, |least| least.min(margin)));
         }
         if ahead < behind {

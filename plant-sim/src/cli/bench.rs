@@ -15,7 +15,8 @@ use super::{Failure, show};
 #[derive(Subcommand)]
 pub(super) enum BenchCommand {
     /// Measure gates in closed loop in seven places with four payloads: times beside the optimum, errors, torques, and how warm
-    /// the motors get; the same with another friction and payload than the controller believes.
+    /// the motors get; the same with another friction and payload than the controller believes; gates at random beside the planner of
+    /// before; how well a pose is attained again and again.
     Motion(MotionArgs),
 }
 
@@ -38,6 +39,12 @@ pub(super) struct MotionArgs {
     /// Write every row to this file as CSV.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write every gate at random to this file as CSV.
+    #[arg(long, value_name = "FILE")]
+    others: Option<PathBuf>,
+    /// Write the repeatability of a pose to this file as CSV.
+    #[arg(long, value_name = "FILE")]
+    repeatability: Option<PathBuf>,
     /// Draw the rows without mismatch into this file.
     #[arg(long, value_name = "FILE", value_parser = svg)]
     svg: Option<PathBuf>,
@@ -58,11 +65,12 @@ pub(super) fn run(command: &BenchCommand) -> Result<(), Failure> {
 
 /// Runs the benchmark and shows it. Fails where a gate was not completed.
 fn motion(args: &MotionArgs) -> Result<(), Failure> {
-    let outputs = args.csv.iter().chain(&args.svg).map(PathBuf::as_path);
-    output::distinct(None, outputs)?;
+    let outputs = [&args.csv, &args.svg, &args.others, &args.repeatability];
+    output::distinct(None, outputs.into_iter().flatten().map(PathBuf::as_path))?;
     // What cannot be written is refused before the work.
     let create = |path: &Option<PathBuf>| path.as_deref().map(File::create).transpose();
     let (csv, svg) = (create(&args.csv)?, create(&args.svg)?);
+    let (others, repeatability) = (create(&args.others)?, create(&args.repeatability)?);
     let extent = if args.quick {
         Extent::Quick
     } else {
@@ -78,6 +86,12 @@ fn motion(args: &MotionArgs) -> Result<(), Failure> {
     let report = bench::motion(extent, &controller, jobs(args.jobs)).map_err(Failure::failed)?;
     if let Some(file) = csv {
         output::finish(file, &bench::csv(&report)?)?;
+    }
+    if let Some(file) = others {
+        output::finish(file, &bench::other_csv(&report)?)?;
+    }
+    if let Some(file) = repeatability {
+        output::finish(file, &bench::repeatability_csv(&report)?)?;
     }
     if let Some(file) = svg {
         output::finish(file, &bench::picture(&report))?;

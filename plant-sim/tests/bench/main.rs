@@ -9,6 +9,7 @@
     reason = "a test fails by panicking"
 )]
 
+mod others;
 mod truth;
 
 use std::fs;
@@ -58,7 +59,7 @@ fn a_row_is_what_the_truth_of_an_ordinary_run_says() {
         (&row["place"], &row["payload_kg"]),
         (&"mid-tan".into(), &2.0.into())
     );
-    let rows = truth(folder.path(), &scenario(2.0, 1.0, 0.25));
+    let rows = truth(folder.path(), &scenario(2.0, 1.0, 0.25), None);
     for row in &rows {
         assert!(distance(&tool(&row.q), &row.tool) < 1e-12);
     }
@@ -153,7 +154,7 @@ fn a_run_at_the_speed_for_ever_is_at_its_rating() {
         let row = &report["rows"][row];
         let figure = |name: &str| row[name].as_f64().unwrap();
         let speed = figure("continuous_speed");
-        let rows = truth(folder.path(), &scenario(kg, speed, 0.25));
+        let rows = truth(folder.path(), &scenario(kg, speed, 0.25), None);
         let motions = motions(&rows);
         let ways = motions.iter();
         let ways = ways.map(|&(begun, ended)| rows[ended].t - rows[begun - 1].t);

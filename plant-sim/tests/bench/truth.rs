@@ -54,11 +54,15 @@ pub(crate) struct Truth {
     pub(crate) tool: [f64; 4],
 }
 
-/// What an ordinary run of `scenario` leaves.
-pub(crate) fn truth(folder: &Path, scenario: &str) -> Vec<Truth> {
+/// What an ordinary run of `scenario` leaves, with a controller that believes in another model if there is one.
+pub(crate) fn truth(folder: &Path, scenario: &str, model: Option<&str>) -> Vec<Truth> {
     fs::write(folder.join("gate.toml"), scenario).unwrap();
     let run = ["run", "--scenario", "gate.toml", "--no-report", "-q"];
-    let output = plant_sim(folder, &run);
+    let models = model.map(|model| ["--model", model, "--plant-model", "irb930-22-1.05"]);
+    let output = plant_sim(
+        folder,
+        &[&run[..], models.as_ref().map_or(&[], |it| &it[..])].concat(),
+    );
     assert!(output.status.success(), "{output:?}");
     let mut reader = csv::Reader::from_path(folder.join("out/truth.csv")).unwrap();
     let rows = reader.records().map(|row| {
