@@ -40,7 +40,9 @@ fn text(value: Value) -> String {
         greatest,
         unit,
         default,
+        whole,
     } = value;
+    let kind = if whole { "a whole number from " } else { "" };
     let otherwise = default.map_or_else(String::new, |default| format!("; {default} if left out"));
-    format!("{least} to {greatest} {unit}{otherwise}")
+    format!("{kind}{least} to {greatest} {unit}{otherwise}")
 }
