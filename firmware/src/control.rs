@@ -1,8 +1,8 @@
 //! One sample of control: states, motion, control laws, limits and faults.
 //!
 //! [`controller`] joins the parts; each of the others is pure: [`readings`] what the drives report, [`states`] the
-//! states, [`laws`] the control laws, [`limits`] what a motor can give, [`monitor`] what counts as a fault, [`fault`] the
-//! reaction to it, [`setup`] what can be changed at run time. [`phase`] is the probe that measures what each part costs.
+//! states, [`laws`] the control laws, [`limits`] what a motor can give, [`monitor`], [`chatter`] and [`heat`] what counts as a fault,
+//! [`fault`] the reaction to it, [`setup`] what can be changed at run time. [`phase`] is the probe that measures what each part costs.
 //! Depends on [`mechanics`](crate::mechanics) and [`trajectory`](crate::trajectory).
 
 /// Declares an enumeration and the list of its variants together, so that the list cannot miss one.
@@ -22,8 +22,10 @@ macro_rules! listed {
     };
 }
 
+pub mod chatter;
 pub mod controller;
 pub mod fault;
+pub mod heat;
 pub mod laws;
 pub mod limits;
 pub mod monitor;

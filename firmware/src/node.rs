@@ -6,6 +6,7 @@
 
 mod parameters;
 mod peers;
+mod report;
 
 use nalgebra::Vector4;
 use protocol::bus::Transmit;
@@ -14,9 +15,8 @@ use protocol::counters::Counters;
 use protocol::e2e::{Profile, Receiver, Verdict};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, Command, DriveStatus, Emergency, Fault, Feedback, Heartbeat, Message, Mode, Motion,
-    MotionRequest, NmtCommand, Node as Name, ParameterReply, Refusal, RefusalReason, ResetReason,
-    Server, State,
+    Cause, Command, DriveStatus, Fault, Feedback, Message, Mode, Motion, MotionRequest, NmtCommand,
+    Node as Name, ParameterReply, Refusal, RefusalReason, ResetReason, Server,
 };
 use protocol::time::{Duration, Instant};
 
@@ -30,10 +30,6 @@ use peers::Pulse;
 
 /// Default age of the feedback at which the drives count as silent: torque off, brake.
 pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
-/// Period of the state message.
-const STATE_PERIOD: Duration = Duration::from_millis(20);
-/// Period of the heartbeat.
-const HEARTBEAT_PERIOD: Duration = Duration::from_millis(100);
 /// Planning pauses every tenth sample, so that no report waits longer: half the period of the state at 1 kHz, for a
 /// tenth of the planning. Counted in samples and not in time, so that the same feedback gives the same torques.
 const REPORT_SAMPLES: u32 = 10;
@@ -190,7 +186,7 @@ impl Node {
         let counter = counter.unwrap_or(0);
         match message {
             Message::Feedback(feedback) => {
-                let verdict = self.feedback.check(counter);
+                let verdict = self.judge(feedback, counter);
                 if self.accept(verdict) {
                     self.bad_feedback = 0;
                     return self.sample(feedback, now, bus, probe);
@@ -233,6 +229,21 @@ impl Node {
             Message::Emergency(..) => {}
         }
         false
+    }
+
+    /// Judges the counter of a feedback. As long as there is torque, one whose counter looks new but whose sample is not is old all the
+    /// same, half a turn of the counter late or sent by another node, and must not take the place of the next one.
+    fn judge(&mut self, feedback: &Feedback, counter: u8) -> Verdict {
+        let mut receiver = self.feedback;
+        let verdict = receiver.check(counter);
+        let is_old = self.newest.is_some_and(|(last, _)| {
+            feedback.sample.wrapping_sub(last).wrapping_sub(1) >= u32::MAX / 2
+        });
+        if verdict.is_new() && is_old && self.controller.state().is_powered() {
+            return Verdict::Stale(1);
+        }
+        self.feedback = receiver;
+        verdict
     }
 
     /// One control sample: the only place where the control advances. Returns whether planning took a step.
@@ -304,60 +315,6 @@ impl Node {
     fn accept(&mut self, verdict: Verdict) -> bool {
         self.received.count(verdict);
         !matches!(verdict, Verdict::Duplicate | Verdict::Stale(_))
-    }
-
-    /// Sends what is due: a reply, an emergency, state and heartbeat.
-    fn report<B: Transmit>(&mut self, now: Instant, bus: &mut B) {
-        // One per call: requests refused together are answered sample by sample.
-        if let Some(reply) = self.controller.take_reply() {
-            self.send(&Message::MotionReply(reply), bus);
-        }
-        if let Some(alarm) = self.controller.take_alarm() {
-            // The state that follows at once names the axis.
-            self.next_state = now;
-            let emergency = Emergency::new(alarm.cause, alarm.value.to_bits());
-            self.send(&Message::Emergency(Name::Controller, emergency), bus);
-        }
-        if now >= self.next_state {
-            self.next_state = now + STATE_PERIOD;
-            let state = self.state();
-            self.send(&Message::State(state), bus);
-        }
-        if now >= self.next_heartbeat {
-            self.next_heartbeat = now + HEARTBEAT_PERIOD;
-            let heartbeat = Heartbeat {
-                state: self.controller.mode(),
-                cause: self.controller.cause(),
-                reset: self.reset,
-            };
-            self.send(&Message::Heartbeat(Name::Controller, heartbeat), bus);
-        }
-    }
-
-    /// The report; takes the limits that have acted since the last one.
-    fn state(&mut self) -> State {
-        let limits = self.controller.take_limits();
-        let controller = &self.controller;
-        let fault = controller.fault();
-        let selection = controller.selection();
-        State {
-            mode: controller.mode(),
-            cause: fault.cause,
-            limits,
-            queue: controller.queued(),
-            completed: controller.completed(),
-            overruns: self.overruns,
-            rejected: self.received.dropped(),
-            worst_tick: self.worst_tick,
-            law: selection.law,
-            compensation: selection.compensation,
-            tracking_error: (*controller.following_error()).into(),
-            fault_axis: fault.axis,
-            fault_value: fault.value,
-            fault_limit: fault.limit,
-            pace: (controller.pace() * 100.0 + 0.5) as u8,
-            operation: controller.operation(),
-        }
     }
 
     fn send<B: Transmit>(&mut self, message: &Message, bus: &mut B) {

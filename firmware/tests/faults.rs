@@ -35,6 +35,9 @@ soft-limit      each axis    stop           nothing        nothing        reset
 estop           at once      emergency stop emergency stop emergency stop reset
 drive-fault     at once      brake          brake          nothing        reset
 encoder-fault   at once      off            off            off            reset
+collision       each axis    stop           off            off            reset
+chatter         40 %         off            off            off            reset
+overload        120 %        stop           nothing        nothing        reset
 ";
 
 fn limit(limit: Limit) -> String {
@@ -42,6 +45,7 @@ fn limit(limit: Limit) -> String {
         Limit::AtOnce => "at once".into(),
         Limit::Milliseconds(ms) => format!("{ms} ms"),
         Limit::Frames(frames) => format!("{frames} frames"),
+        Limit::Percent(share) => format!("{share} %"),
         Limit::EachAxis => "each axis".into(),
     }
 }
@@ -90,6 +94,9 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::EncoderFault => {
             "status of the drives; a jump no axis can make; away from the reference, faster and faster, against the torque"
         }
+        Cause::Collision => "effort that the model does not explain, by the observer",
+        Cause::Chatter => "torques that swing from sample to sample",
+        Cause::Overload => "mean square of the effort over that of continuous operation",
         other => panic!("{other} is in the table: say what detects it"),
     }
 }

@@ -41,7 +41,7 @@ fn wrong_content_is_refused_by_cause() {
         ),
         (
             "reserved bit",
-            protected(&table::STATE, &[0, 0, 0, 0x40]),
+            protected(&table::STATE, &[0, 0, 0, 0x80]),
             Malformed,
         ),
         (

@@ -13,6 +13,9 @@ use protocol::time::{Duration, Instant, Period};
 
 /// Most samples by which one feedback frame may advance the clock, 1000 s at 1 kHz: more is not a gap but another run.
 const MAX_STEP: u32 = 1_000_000;
+/// Frames in a row, older than the newest sample and each newer than the one before, that are those of restarted drives: fewer are late
+/// ones, after which the numbers go on where they were.
+const RESTART_FRAMES: u8 = 3;
 
 /// The clock of a controller in lock-step.
 #[derive(Clone, Copy, Debug)]
@@ -21,6 +24,10 @@ pub struct SampleClock {
     now: Instant,
     /// Number of the newest sample, and its time.
     newest: Option<(u32, Instant)>,
+    /// The same of the last frame, where that was older.
+    older: Option<(u32, Instant)>,
+    /// Such frames in a row.
+    run: u8,
 }
 
 impl SampleClock {
@@ -30,6 +37,8 @@ impl SampleClock {
             period,
             now: Instant::ORIGIN,
             newest: None,
+            older: None,
+            run: 0,
         }
     }
 
@@ -47,16 +56,36 @@ impl SampleClock {
             && let Ok(received) = codec::decode(frame)
             && let Message::Feedback(feedback) = received.message
         {
-            if let Some((last, at)) = self.newest {
-                let step = feedback.sample.wrapping_sub(last);
-                if step <= MAX_STEP {
-                    // Time already elapsed without a sample is not counted twice.
-                    self.now = self.now.max(at + self.period.duration() * step);
-                }
-            }
-            self.newest = Some((feedback.sample, self.now));
+            self.count(feedback.sample);
         }
         self.now > before
+    }
+
+    fn count(&mut self, sample: u32) {
+        if self.newest.is_none_or(|newest| self.pass(sample, newest)) {
+            self.adopt(sample);
+            return;
+        }
+        let follows = self.older.is_some_and(|older| self.pass(sample, older));
+        self.run = if follows { self.run + 1 } else { 1 };
+        self.older = Some((sample, self.now));
+        if self.run == RESTART_FRAMES {
+            self.adopt(sample);
+        }
+    }
+
+    fn adopt(&mut self, sample: u32) {
+        (self.newest, self.older, self.run) = (Some((sample, self.now)), None, 0);
+    }
+
+    /// Advances to a sample, if it is newer than the one at that time. Time already elapsed without a sample is not counted twice.
+    fn pass(&mut self, sample: u32, (last, at): (u32, Instant)) -> bool {
+        let step = sample.wrapping_sub(last);
+        let is_newer = (1..=MAX_STEP).contains(&step);
+        if is_newer {
+            self.now = self.now.max(at + self.period.duration() * step);
+        }
+        is_newer
     }
 
     /// Lets time pass without a sample: the drives are silent, and a watchdog must notice.
@@ -85,7 +114,25 @@ mod tests {
     fn time_is_the_number_of_samples_and_never_runs_backwards() {
         let mut clock = SampleClock::new(Period::of_rate(1000.0));
         // Sample number, expected time in samples: gaps count, old samples and a restart do not.
-        for (sample, expected) in [(7, 0), (8, 1), (11, 4), (10, 4), (12, 6), (0, 6), (1, 7)] {
+        for (sample, expected) in [(7, 0), (8, 1), (11, 4), (10, 4), (12, 5), (0, 5), (1, 6)] {
+            clock.observe(&feedback(sample));
+            assert_eq!(
+                clock.now(),
+                Instant::from_micros(expected * 1000),
+                "sample {sample}"
+            );
+        }
+        // Two late ones are no restart, a third would be.
+        for (sample, expected) in [
+            (13, 6),
+            (3, 6),
+            (4, 7),
+            (15, 8),
+            (2, 8),
+            (3, 9),
+            (4, 10),
+            (5, 11),
+        ] {
             clock.observe(&feedback(sample));
             assert_eq!(
                 clock.now(),
@@ -94,18 +141,18 @@ mod tests {
             );
         }
         clock.elapse(Duration::from_micros(2_500));
-        assert_eq!(clock.now(), Instant::from_micros(9_500));
+        assert_eq!(clock.now(), Instant::from_micros(13_500));
         clock.observe(&feedback(u32::MAX));
         clock.observe(&feedback(0));
         assert_eq!(
             clock.now(),
-            Instant::from_micros(10_500),
+            Instant::from_micros(14_500),
             "sample numbers wrap"
         );
         // 2.5 ms of silence, and then the fourth sample since the last: 4 ms have passed, not 6.5.
         clock.elapse(Duration::from_micros(2_500));
         clock.observe(&feedback(4));
-        assert_eq!(clock.now(), Instant::from_micros(14_500));
+        assert_eq!(clock.now(), Instant::from_micros(18_500));
     }
 
     #[test]

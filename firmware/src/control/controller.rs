@@ -16,13 +16,12 @@ mod transitions;
 
 use heapless::Deque;
 use nalgebra::Vector4;
-use protocol::messages::{
-    Cause, ControlWord, Fault, LimitFlags, Mode, MotionReply, MotionRequest, Operation, Outcome,
-    Refusal,
-};
+use protocol::messages::{Cause, ControlWord, Fault, LimitFlags, Mode, MotionReply, Operation};
 use protocol::time::Period;
 use serde::{Deserialize, Serialize};
 
+use crate::control::chatter::Chatter;
+use crate::control::heat::Heat;
 use crate::control::laws::{ControlInput, Memory, Model, Motion, Selection, Task};
 use crate::control::limits;
 use crate::control::monitor::Monitor;
@@ -36,7 +35,6 @@ use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::clamp;
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use crate::trajectory::{Rates, Reference, Setpoint};
-use requests::Answer;
 
 /// Planning steps per millisecond of the sampling period.
 const PLANNING_STEPS_PER_MS: f32 = 1.0;
@@ -114,6 +112,8 @@ pub struct Controller {
     setpoint: Setpoint,
     memory: Memory,
     monitor: Monitor,
+    heat: Heat,
+    chatter: Chatter,
     excess: Vector4<f32>,
     error: Vector4<f32>,
     replies: Deque<MotionReply, { 2 * CAPACITY }>,
@@ -153,6 +153,8 @@ impl Controller {
             setpoint: Setpoint::rest(Vector4::zeros()),
             memory: Memory::new(),
             monitor: Monitor::new(&config.arm, &config.setup.monitor, config.period.seconds()),
+            heat: Heat::new(),
+            chatter: Chatter::new(),
             excess: Vector4::zeros(),
             error: Vector4::zeros(),
             replies: Deque::new(),
@@ -215,6 +217,16 @@ impl Controller {
         &self.error
     }
 
+    /// Efforts of the last sample that the model does not explain: N m, N m, N, N m.
+    pub fn disturbance(&self) -> &Vector4<f32> {
+        self.memory.disturbance()
+    }
+
+    /// Heat of each motor: 1 is what it may have for ever.
+    pub fn heat(&self) -> &Vector4<f32> {
+        self.heat.shares()
+    }
+
     /// Every limit that has acted since the last call.
     pub fn take_limits(&mut self) -> LimitFlags {
         core::mem::take(&mut self.limits)
@@ -245,36 +257,6 @@ impl Controller {
         self.queue.completed()
     }
 
-    /// Number of replies to send.
-    pub fn answers_waiting(&self) -> usize {
-        self.replies.len()
-    }
-
-    /// Requests that were never answered, because too many replies were waiting.
-    pub fn unanswered(&self) -> u16 {
-        self.unanswered
-    }
-
-    /// The next reply to send to an operator.
-    pub fn take_reply(&mut self) -> Option<MotionReply> {
-        self.replies.pop_front()
-    }
-
-    /// Refuses a request without examining it further.
-    pub fn refuse(&mut self, sequence: u8, refusal: Refusal) {
-        self.reply(sequence, Outcome::Refused(refusal));
-    }
-
-    /// Accepts or refuses an operator's request. [`Controller::take_reply`] has the answer at once, or for a move once
-    /// it has been planned.
-    pub fn request(&mut self, sequence: u8, request: &MotionRequest) {
-        match self.accept(sequence, request) {
-            Ok(Answer::Now) => self.reply(sequence, Outcome::Accepted),
-            Ok(Answer::WhenPlanned | Answer::Never) => {}
-            Err(refusal) => self.reply(sequence, Outcome::Refused(refusal)),
-        }
-    }
-
     /// One sample. Worst case: one trajectory evaluation, one more look ahead and one control law. Planning is not part
     /// of it: call [`Controller::plan`] once the command is on its way.
     pub fn step<P: Probe>(&mut self, readings: &Readings, probe: &mut P) -> Actions {
@@ -286,6 +268,7 @@ impl Controller {
         if readings.steps > 1 {
             self.bridge(readings.steps);
         }
+        self.warm(&measured_torque, readings.steps);
         self.watch(readings, &q, &qd);
         self.wait(readings);
         if !self.state.is_powered() {
@@ -296,6 +279,7 @@ impl Controller {
             self.excess = Vector4::zeros();
             self.saturated = 0;
             self.let_go();
+            self.chatter = Chatter::new();
             return self.torque_off();
         }
         let period = self.config.period.seconds();
@@ -315,6 +299,7 @@ impl Controller {
             qdd_ahead: ahead.qdd,
             lead,
             period,
+            elapsed: period * readings.steps as f32,
             excess: self.excess,
         };
         probe.end(Phase::Reference);
@@ -323,16 +308,19 @@ impl Controller {
         probe.end(Phase::Kinematics);
         let model = Model::new(&self.body, &trig, &motion);
         probe.end(Phase::Dynamics);
+        if self.state.is_braking() || readings.steps > self.max_gap {
+            // The brake holds: the load it carries must not be mistaken for a disturbance. Nor what has not been seen.
+            self.memory = Memory::new();
+        }
+        let corner = self.setup.selection.gains.observer;
+        let disturbance = self.memory.observe(&motion, &model, corner);
         let input = ControlInput {
             motion: &motion,
             task: &task,
             model: &model,
             nominal_inertia: &self.body.nominal_inertia,
+            disturbance: &disturbance,
         };
-        if self.state.is_braking() {
-            // The brake holds: the load it carries must not be mistaken for a disturbance.
-            self.memory = Memory::new();
-        }
         let torque = self.setup.selection.torque(&input, &mut self.memory);
         if !torque.iter().all(|torque| torque.is_finite()) {
             // No finite input leads here; should it happen, close the brake.
@@ -354,6 +342,9 @@ impl Controller {
         if self.operation == Operation::Manual {
             self.watch_tool(&task.actual.task_velocity(&qd));
         }
+        if !self.is_even(&limited.motor_torque) || !self.state.is_powered() {
+            return self.torque_off();
+        }
         probe.end(Phase::Limits);
         Actions {
             control: self.control_word(),
@@ -366,14 +357,6 @@ impl Controller {
         Actions {
             control: self.control_word(),
             torque: [0.0; 4],
-        }
-    }
-
-    fn reply(&mut self, sequence: u8, outcome: Outcome) {
-        let reply = MotionReply { sequence, outcome };
-        // The outbox has room for the replies to everything that can wait to be planned, and as many again.
-        if self.replies.push_back(reply).is_err() {
-            self.unanswered = self.unanswered.saturating_add(1);
         }
     }
 }

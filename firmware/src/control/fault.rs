@@ -33,6 +33,11 @@ pub const SATURATION_MS: u32 = milliseconds(Parameter::SaturationTime);
 /// three last no longer than an allowed gap.
 pub const BAD_FRAMES: u8 = Parameter::BadFrames.initial(1.0) as u8;
 
+/// Swing of the torques from sample to sample that stops the arm, %: see [`Chatter`](super::chatter::Chatter).
+pub const CHATTER_PERCENT: u16 = 40;
+/// Heat of a motor that stops the arm, % of what it may have for ever: see [`Heat`](super::heat::Heat).
+pub const OVERLOAD_PERCENT: u16 = 120;
+
 /// Default of a parameter given in s, in ms.
 const fn milliseconds(parameter: Parameter) -> u32 {
     (parameter.initial(1.0) * 1e3 + 0.5) as u32
@@ -47,6 +52,8 @@ pub enum Limit {
     Milliseconds(u32),
     /// This many frames in a row.
     Frames(u8),
+    /// More than this share, %.
+    Percent(u16),
     /// [`MonitorLimits`](super::monitor::MonitorLimits): a limit per axis, for a number of consecutive samples.
     EachAxis,
 }
@@ -109,9 +116,9 @@ const fn row(
 }
 
 /// Every cause that the controller raises.
-pub static REACTIONS: [Row; 16] = {
+pub static REACTIONS: [Row; 19] = {
     use Latch::{Reset, Restart};
-    use Limit::{AtOnce, EachAxis, Frames, Milliseconds};
+    use Limit::{AtOnce, EachAxis, Frames, Milliseconds, Percent};
     use Reaction::{Brake, EmergencyStop, None, Off, Stop};
     [
         row(Cause::SelfTest, AtOnce, [None, None, None], Restart),
@@ -169,6 +176,21 @@ pub static REACTIONS: [Row; 16] = {
         ),
         row(Cause::DriveFault, AtOnce, [Brake, Brake, None], Reset),
         row(Cause::EncoderFault, AtOnce, [Off, Off, Off], Reset),
+        // Whatever it has met, it must not go on pressing against it.
+        row(Cause::Collision, EachAxis, [Stop, Off, Off], Reset),
+        // The loop that a stop would need is the one that does not work.
+        row(
+            Cause::Chatter,
+            Percent(CHATTER_PERCENT),
+            [Off, Off, Off],
+            Reset,
+        ),
+        row(
+            Cause::Overload,
+            Percent(OVERLOAD_PERCENT),
+            [Stop, None, None],
+            Reset,
+        ),
     ]
 };
 

@@ -9,8 +9,7 @@
 //! | [`computed_torque`] | dynamic control, joint space, tracking form | M, C, g, friction |
 //! | [`computed_torque_task`] | eq 49 | the same and the Jacobian |
 //!
-//! All are pure functions of a [`ControlInput`] plus a [`Memory`] (integrals and observer). Outputs
-//! are joint torques: N m, N m, N, N m.
+//! All are pure functions of a [`ControlInput`] plus a [`Memory`] (integrals). Outputs are joint torques: N m, N m, N, N m.
 
 pub mod computed_torque;
 pub mod computed_torque_task;
@@ -31,7 +30,7 @@ pub use control_input::{ControlInput, Model, Motion, Task};
 pub use gains::Gains;
 use observer::MomentumObserver;
 
-/// What a law remembers between samples.
+/// What is remembered between samples: integrals and the observer.
 #[derive(Clone, Copy, Debug)]
 pub struct Memory {
     integral: Vector4<f32>,
@@ -45,6 +44,17 @@ impl Memory {
             integral: Vector4::zeros(),
             observer: MomentumObserver::new(),
         }
+    }
+
+    /// What the torques of the last sample leave unexplained, by the model and the disturbance observer with this corner (rad/s): N m, N m,
+    /// N, N m. Watched with every law, used by those that compensate with it.
+    pub fn observe(&mut self, motion: &Motion<'_>, model: &Model, corner: f32) -> Vector4<f32> {
+        self.observer.update(motion, model, corner)
+    }
+
+    /// What it was in the last sample.
+    pub fn disturbance(&self) -> &Vector4<f32> {
+        self.observer.residual()
     }
 
     /// Adds `error` over one sample, except where the axis is saturated in that direction

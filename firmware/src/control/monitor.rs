@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::control::readings::Readings;
 use crate::mechanics::arm::{ArmModel, Axis};
 
+/// Share of the speed that stops an axis from which on it counts as one that is to move.
+const SLOW: f32 = 0.01;
+
 /// Limits whose violation stops the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MonitorLimits {
@@ -17,6 +20,8 @@ pub struct MonitorLimits {
     pub speed_factor: f32,
     /// How far past its range a joint may be: rad, rad, m, rad.
     pub range_margin: Vector4<f32>,
+    /// Largest effort that the model does not explain, as a share of the limit of the joint.
+    pub collision: f32,
     /// Consecutive samples before a violation counts.
     pub samples: u32,
     /// Longest gap in the feedback across which the trajectory continues, s.
@@ -27,7 +32,8 @@ impl MonitorLimits {
     /// Limits of the bench. Following error: 0.05 rad is 53 mm at the flange of the stretched arm, which the kinematic
     /// laws keep (20 mm RMS in the gate); computed torque uses a hundredth of it. Speed: a tenth above what a plan may
     /// use. Range: the stopping distance from a fifth of full speed, so that overshoot at a limit does not trip. Three
-    /// samples: two can be noise.
+    /// samples: two can be noise. Collision: 10 kg more than were announced at full speed are half of the limit, a payload and
+    /// friction that are a third wrong a fifth.
     pub const DEFAULT: Self = Self {
         following_error: Vector4::new(
             Parameter::FollowingErrorShoulder.initial(1.0),
@@ -42,6 +48,7 @@ impl MonitorLimits {
             Parameter::RangeMarginLift.initial(1.0),
             Parameter::RangeMarginWrist.initial(1.0),
         ),
+        collision: Parameter::CollisionLimit.initial(1.0),
         samples: Parameter::FaultSamples.initial(1.0) as u32,
         gap: Parameter::FeedbackGap.initial(1.0),
     };
@@ -62,12 +69,18 @@ pub struct Monitor {
     /// Middle of the joint ranges, and how far from it a joint may be.
     middle: Vector4<f32>,
     reach: Vector4<f32>,
+    /// Efforts that the model need not explain, N m, N m, N, N m.
+    collision: Vector4<f32>,
     needed: u32,
+    collision_count: u32,
     following_count: u32,
     speed_count: u32,
     range_count: u32,
     /// Velocities of the motors when an axis was first found too far from its reference, rad/s.
     velocity: Vector4<f32>,
+    /// The same, and the velocities of the reference, when an effort was first not explained.
+    velocity_felt: Vector4<f32>,
+    wanted: Vector4<f32>,
 }
 
 impl Monitor {
@@ -81,11 +94,15 @@ impl Monitor {
             speed: Vector4::zeros(),
             middle: 0.5 * (arm.limits.upper + arm.limits.lower),
             reach: Vector4::zeros(),
+            collision: Vector4::zeros(),
             needed: 0,
+            collision_count: 0,
             following_count: 0,
             speed_count: 0,
             range_count: 0,
             velocity: Vector4::zeros(),
+            velocity_felt: Vector4::zeros(),
+            wanted: Vector4::zeros(),
         };
         monitor.adopt(arm, limits, period);
         monitor
@@ -98,6 +115,7 @@ impl Monitor {
         // At full speed in the wrong direction.
         self.jump = self.speed * (2.0 * period);
         self.reach = 0.5 * (arm.limits.upper - arm.limits.lower) + limits.range_margin;
+        self.collision = arm.limits.effort * limits.collision;
         self.needed = limits.samples;
     }
 
@@ -127,7 +145,7 @@ impl Monitor {
         let speed = first_beyond(qd, &self.speed);
         let range = first_beyond(&(q - self.middle), &self.reach);
         if following.is_none() && speed.is_none() && range.is_none() {
-            self.reset();
+            (self.following_count, self.speed_count, self.range_count) = (0, 0, 0);
             return None;
         }
         self.trip(readings, [q, qd, error, before], [following, speed, range])
@@ -178,8 +196,45 @@ impl Monitor {
         }
     }
 
+    /// Judges the efforts that the model does not explain. An arm that has met something feels them, and so does one whose encoder does
+    /// not show where it is: then they are what its loop makes of that. `wanted` is the velocity of the reference.
+    pub fn feel(
+        &mut self,
+        readings: &Readings,
+        qd: &Vector4<f32>,
+        disturbance: &Vector4<f32>,
+        error: &Vector4<f32>,
+        wanted: &Vector4<f32>,
+    ) -> Option<Fault> {
+        let beyond = first_beyond(disturbance, &self.collision);
+        if beyond.is_some() && self.collision_count == 0 {
+            (self.velocity_felt, self.wanted) = (readings.velocity, *wanted);
+        }
+        let axis = count(&mut self.collision_count, beyond, self.needed)?;
+        // Readings of whatever axis that do not go where it went until now are not those of an obstacle, which only slows it down in so few
+        // samples.
+        let wanted = self.wanted;
+        let slow = self.speed * SLOW;
+        let was_to_move = |axis: &Axis| axis.of(&wanted).abs() > axis.of(&slow);
+        let mut moving = Axis::ALL.into_iter().filter(was_to_move);
+        let mut stands = moving.clone().chain([axis]);
+        let turned = |axis: &Axis| axis.of(qd) * axis.of(&wanted) < 0.0;
+        Some(
+            if let Some(axis) = stands.find(|axis| readings.is_still(*axis)) {
+                of_axis(Cause::StuckSensor, axis, error, &Vector4::zeros())
+            } else if let Some(axis) = moving.find(turned) {
+                of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
+            } else if readings.defies_torque(axis, axis.of(&self.velocity_felt)) {
+                of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
+            } else {
+                of_axis(Cause::Collision, axis, disturbance, &self.collision)
+            },
+        )
+    }
+
     /// Forgets the counts, for a new start.
     pub fn reset(&mut self) {
+        self.collision_count = 0;
         self.following_count = 0;
         self.speed_count = 0;
         self.range_count = 0;

@@ -29,6 +29,8 @@ pub struct Setup {
     pub hold_time: f32,
     /// Time at a torque limit of an axis that hardly moves that stops the arm, s.
     pub saturation_time: f32,
+    /// Time constant with which a motor warms up and cools down, s.
+    pub thermal_time: f32,
     /// Rejected, stale or duplicate feedback frames in a row that stop the arm.
     pub bad_frames: u32,
 }
@@ -50,6 +52,7 @@ impl Setup {
             heartbeat_timeout: const { Parameter::HeartbeatTimeout.initial(1.0) },
             hold_time: const { Parameter::HoldTime.initial(1.0) },
             saturation_time: const { Parameter::SaturationTime.initial(1.0) },
+            thermal_time: const { Parameter::ThermalTime.initial(1.0) },
             bad_frames: const { Parameter::BadFrames.initial(1.0) as u32 },
         }
     }

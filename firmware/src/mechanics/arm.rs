@@ -38,6 +38,27 @@ impl Axis {
             Self::Wrist => joint.w,
         }
     }
+
+    /// The same, to change it.
+    pub fn of_mut(self, joint: &mut Vector4<f32>) -> &mut f32 {
+        match self {
+            Self::Shoulder => &mut joint.x,
+            Self::Elbow => &mut joint.y,
+            Self::Lift => &mut joint.z,
+            Self::Wrist => &mut joint.w,
+        }
+    }
+
+    /// The next one in turn.
+    #[must_use]
+    pub const fn next(self) -> Self {
+        match self {
+            Self::Shoulder => Self::Elbow,
+            Self::Elbow => Self::Lift,
+            Self::Lift => Self::Wrist,
+            Self::Wrist => Self::Shoulder,
+        }
+    }
 }
 
 /// A rigid body of the arm.

@@ -56,6 +56,8 @@ pub struct MoveQueue {
     found: f32,
     /// In manual operation: whether somebody holds it.
     held: Option<bool>,
+    /// Pace at which the motors do not get too hot. Only moves that begin follow it.
+    cool: f32,
     /// Where the last planned move ends: the next one starts there.
     plan_end: Vector4<f32>,
     completed: u8,
@@ -72,6 +74,7 @@ impl MoveQueue {
             asked: 1.0,
             found: 1.0,
             held: None,
+            cool: 1.0,
             plan_end: Vector4::zeros(),
             completed: 0,
         }
@@ -113,7 +116,7 @@ impl MoveQueue {
         if self.held == Some(false) {
             0.0
         } else {
-            self.asked.min(self.found)
+            self.asked.min(self.found).min(self.cool)
         }
     }
 
@@ -140,6 +143,11 @@ impl MoveQueue {
     pub fn set_pace(&mut self, pace: f32) {
         self.asked = pace;
         self.try_full_pace();
+    }
+
+    /// Pace at which moves may begin for the heat of the motors.
+    pub fn set_cool_pace(&mut self, pace: f32) {
+        self.cool = pace;
     }
 
     /// Forgets the pace at which the torque was found to suffice: for another payload, say.

@@ -52,6 +52,8 @@ pub(crate) struct Bench {
     pub sequence: u8,
     pub position: [i32; 4],
     pub velocity: [f32; 4],
+    /// What the drives report, of a thousandth of the rated torque.
+    pub torque: [i16; 4],
     /// What the drives report besides whether torque is on.
     pub status: DriveStatus,
     /// Whether the drives do what the control word says.
@@ -77,6 +79,7 @@ impl Bench {
             sequence: 0,
             position: [0; 4],
             velocity: [0.0; 4],
+            torque: [0; 4],
             status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
             obeys: true,
             follows: false,
@@ -128,6 +131,7 @@ impl Bench {
         let mut config = Config::new(IRB_930, PERIOD);
         // These drives report no torque: what an observer would make of that is no motion.
         config.setup.selection.compensation = Compensation::None;
+        config.setup.monitor.collision = f32::MAX;
         let mut bench = Self::with(config);
         bench.enable();
         bench.follows = true;
@@ -165,7 +169,7 @@ impl Bench {
             status: self.status.with(DriveStatus::TORQUE_ON, is_on),
             position: self.position,
             velocity: self.velocity,
-            torque: [0; 4],
+            torque: self.torque,
         };
         let frame = encode(&Message::Feedback(feedback), self.feedback_counter).unwrap();
         self.sample += 1;

@@ -7,8 +7,8 @@ use nalgebra::Vector4;
 use protocol::e2e::Profile;
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, ControlWord, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode,
-    MotionRequest, Node as Name, Outcome, State,
+    Cause, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode, MotionRequest,
+    Node as Name, Outcome, State,
 };
 use protocol::time::Period;
 
@@ -129,6 +129,15 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             arm.payload_max = -1.0;
             Bench::with(Config::new(arm, PERIOD))
         }
+        Cause::Overload => {
+            let mut config = Config::new(IRB_930, PERIOD);
+            // Nothing moves, whatever the torque.
+            config.setup.monitor.collision = f32::MAX;
+            config.setup.thermal_time = 1.0;
+            let mut bench = Bench::with(config);
+            bench.enable();
+            bench
+        }
         _ => Bench::enabled(),
     };
     let repeat = |bench: &mut Bench, frame: CanFrame| {
@@ -216,6 +225,23 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.status = DriveStatus::READY;
             bench.step()
         }
+        Cause::Collision => {
+            // 1.6 m/s from one sample to the next, at rest before.
+            bench.velocity[2] = 400.0;
+            bench.run(4)
+        }
+        Cause::Chatter => (0..100)
+            .flat_map(|_| {
+                // 0.08 rad/s, to and fro.
+                bench.velocity[1] = if bench.velocity[1] > 0.0 { -4.0 } else { 4.0 };
+                bench.step()
+            })
+            .collect(),
+        Cause::Overload => {
+            // 1.3 times the rated torque.
+            bench.torque[2] = 1300;
+            bench.run(3000)
+        }
         Cause::None | Cause::Babbling | Cause::BusOff | Cause::Overrun | Cause::SchemaMismatch => {
             return None;
         }
@@ -260,42 +286,13 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
                 "drive fault: drive status ready torque-on fault encoder-valid".into()
             }
             Cause::EncoderFault => "encoder fault: drive status ready torque-on".into(),
+            Cause::Collision => "collision, axis 3 (lift): 1874.9 N, limit 688.0 N".into(),
+            Cause::Chatter => "chatter, axis 2 (elbow): 41 %, limit 40 %".into(),
+            Cause::Overload => "overload, axis 3 (lift): 120 %, limit 120 %".into(),
             _ => String::new(),
         };
         assert_eq!(state.fault().to_string(), expected);
     }
-}
-
-/// Drives that have missed commands go on with the next one, from where the arm has coasted to: that has to be a fault.
-#[test]
-fn drives_that_switch_off_by_themselves_are_a_fault() {
-    let mut bench = Bench::moving();
-    bench.obeys = false;
-    bench.step();
-    bench.obeys = true;
-    let words = bench.words(200);
-    assert_eq!(
-        words.first(),
-        Some(&ControlWord::TORQUE_ENABLE),
-        "the brake closes at once"
-    );
-    assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
-    assert_eq!(bench.mode(), Mode::Fault);
-    let status = "drive fault: drive status ready encoder-valid";
-    assert_eq!(bench.node.controller().fault().to_string(), status);
-}
-
-/// Nobody else says so, and the next word of a controller that is switching off would bring their torque back.
-#[test]
-fn drives_that_switch_off_before_they_are_told_to_are_a_fault() {
-    let mut bench = Bench::enabled();
-    let frame = bench.motion(MotionRequest::Disable);
-    bench.wire.to_node.push_back(frame);
-    bench.step();
-    assert_eq!(bench.mode(), Mode::Disabling);
-    bench.obeys = false;
-    bench.run(2);
-    assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
 }
 
 /// 2 x 1.1 x 12.2 rad/s is 27 mrad in a sample, at whatever rate and after however many lost samples; the following error is allowed

@@ -23,6 +23,7 @@ fn manual() -> Bench {
     let mut config = Config::new(IRB_930, PERIOD);
     // These drives report no torque.
     config.setup.selection.compensation = Compensation::None;
+    config.setup.monitor.collision = f32::MAX;
     let mut bench = Bench::with(config);
     bench.enable();
     bench.follows = true;
@@ -222,6 +223,7 @@ fn a_hold_is_refused_where_it_has_no_effect() {
     // An operator who is heard for the first time: this may be a recorded frame.
     let mut config = Config::new(IRB_930, PERIOD);
     config.setup.selection.compensation = Compensation::None;
+    config.setup.monitor.collision = f32::MAX;
     let mut bench = Bench::with(config);
     bench.run(5);
     let frame = bench.motion(MotionRequest::Hold);
@@ -343,6 +345,7 @@ fn manual_operation_frees_an_arm_from_beyond_a_limit() {
     for operation in [Operation::Automatic, Operation::Manual] {
         let mut config = Config::new(IRB_930, PERIOD);
         config.setup.selection.compensation = Compensation::None;
+        config.setup.monitor.collision = f32::MAX;
         let mut bench = Bench::with(config);
         bench.put(&Vector4::from(beyond));
         bench.hello(protocol::table::HASH);

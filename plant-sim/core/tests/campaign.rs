@@ -272,7 +272,7 @@ fn judge(fault: &str, payload: f64, defect: Option<Defect>) -> Verdict {
 }
 
 /// A small campaign: every kind of detection and reaction once.
-const CASES: [(&str, f64); 13] = [
+const CASES: [(&str, f64); 14] = [
     ("none", 2.0),
     ("feedback:loss@0.45s..0.452s", 2.0),
     ("feedback:corrupt@0.45s..0.452s", 2.0),
@@ -280,6 +280,8 @@ const CASES: [(&str, f64); 13] = [
     ("feedback:corrupt@0.45s..0.462s", 22.0),
     ("feedback:corrupt@0.7s..0.712s", 22.0),
     ("feedback:replay=8@0.45s..0.462s", 22.0),
+    // At rest, where old positions are as good as new ones.
+    ("feedback:replay=8@0.25s..0.262s", 22.0),
     ("feedback:loss@0.45s..0.456s", 22.0),
     ("encoder:elbow:jump=0.07@0.45s", 2.0),
     ("encoder:elbow:jump=0.5@0.45s", 22.0),

@@ -169,6 +169,13 @@ fn commands(record: &Record) -> Vec<CanFrame> {
         .collect()
 }
 
+/// Where the commands of two runs first differ.
+fn first_difference(a: &Record, b: &Record) -> Option<(usize, CanFrame, CanFrame)> {
+    let (a, b) = (commands(a), commands(b));
+    let pairs = a.into_iter().zip(b).enumerate();
+    pairs.map(|(k, (a, b))| (k, a, b)).find(|(_, a, b)| a != b)
+}
+
 /// Frames that the controller has dropped.
 fn rejected(record: &Record) -> u16 {
     let states = record.frames.iter().rev();
@@ -187,7 +194,7 @@ fn a_poor_masquerade_changes_no_torque() {
     for fault in ["feedback:masquerade@300.5ms", "feedback:masquerade@300.7ms"] {
         let (summary, with) = gate(fault);
         assert!(summary.completed, "{fault}: {:?}", summary.error);
-        assert_eq!(commands(&with), commands(&without), "{fault}");
+        assert_eq!(first_difference(&with, &without), None, "{fault}");
         assert!(
             rejected(&with) > rejected(&without) + 500,
             "{fault}: {}",
@@ -208,78 +215,33 @@ fn a_masquerade_on_the_beat_is_a_bus_error() {
     assert_ne!(cause(&record), Cause::None);
 }
 
-/// With everything right there is nothing to tell it by: the controller takes the old positions for new ones. This is what is not
-/// promised.
+/// A sample that the controller has had already is nothing new, whatever its counter says: it is dropped, and does not take the place of
+/// the true one after it.
 #[test]
-fn a_forged_frame_is_believed() {
-    let (sound, without) = gate("payload:dropped@100s");
+fn a_forged_feedback_changes_nothing() {
+    let (_, without) = gate("payload:dropped@100s");
     let (summary, with) = gate("feedback:forged@400.5ms");
-    assert_ne!(commands(&with), commands(&without));
-    assert!(summary.tracking_error_mm.max > 100.0 * sound.tracking_error_mm.max);
-    assert!(
-        rejected(&with) > 400,
-        "the true ones come too late: {}",
-        rejected(&with)
-    );
-}
-
-/// Nobody else sends those, and no node receives its own: the arm stops under control.
-#[test]
-fn a_forged_frame_of_the_controller_stops_the_arm() {
-    for message in ["command", "state", "controllerheartbeat"] {
-        let (summary, record) = gate(&format!("{message}:forged@400.5ms"));
-        assert!(!summary.completed && summary.at_rest, "{message}");
-        assert_eq!(cause(&record), Cause::DuplicateNode, "{message}");
-    }
-}
-
-/// Ten a second, each behind what its sample has sent: by their own counters none is lost, and no command is later for them.
-#[test]
-fn drives_and_operator_give_signs_of_life() {
-    let (summary, record) = gate("payload:dropped@100s");
-    let length = record.truths.last().unwrap().plant.t;
-    for (info, node) in [
-        (&table::DRIVES_HEARTBEAT, Node::Drives),
-        (&table::OPERATOR_HEARTBEAT, Node::Operator),
-    ] {
-        let beats = record
-            .frames
-            .iter()
-            .filter(|(_, frame)| info.identifies(frame));
-        let beats: Vec<_> = beats
-            .map(|(_, frame)| codec::decode(frame).unwrap())
-            .collect();
-        assert!((beats.len() as f64 - length * 10.0).abs() <= 1.0, "{node}");
-        for (k, beat) in beats.iter().enumerate() {
-            assert_eq!(beat.counter, Some((k % 16) as u8), "{node}");
-        }
-    }
     assert!(summary.completed, "{:?}", summary.error);
+    // Once the torque is off the drives may restart.
+    if let Some((_, _, command)) = first_difference(&with, &without) {
+        let Message::Command(command) = codec::decode(&command).unwrap().message else {
+            panic!("a command");
+        };
+        assert_eq!(command.control, ControlWord::EMPTY);
+    }
+    assert!(rejected(&with) > 400, "{}", rejected(&with));
 }
 
-/// Nobody watches over the arm, and 250 ms after the last sign of life it stops, on its path. A shorter silence is none.
+/// A feedback so late that its counter looks new: its sample runs backwards.
 #[test]
-fn a_silent_operator_stops_the_arm() {
-    let mut scenario = Scenario::built_in("gate").unwrap();
-    scenario.cycles = 3;
-    for fault in ["operator:silent@0.4s", "operatorheartbeat:loss@0.4s"] {
-        let (summary, record) = run_of(scenario.clone(), &[fault], 5);
-        assert!(!summary.completed && summary.at_rest, "{fault}");
-        assert_eq!(cause(&record), Cause::OperatorSilent, "{fault}");
-        let told = record.frames.iter().find_map(|(time, frame)| {
-            let emergency = table::CONTROLLER_EMERGENCY.identifies(frame);
-            emergency.then_some(time.seconds())
-        });
-        // The last one was sent at 350 ms and its sample's three fifths.
-        let late = told.unwrap() - 0.3506;
-        assert!((0.249..0.254).contains(&late), "{fault}: {late}");
+fn a_very_late_feedback_changes_nothing() {
+    for ms in [129, 192, 255, 1000] {
+        let (summary, _) = gate(&format!(
+            "feedback:delay={}@200samples..+1samples",
+            f64::from(ms) * 1e-3
+        ));
+        assert!(summary.completed, "{ms} ms: {:?}", summary.error);
     }
-    let (summary, record) = run_of(scenario.clone(), &["operatorheartbeat:loss@0.4s..0.5s"], 5);
-    assert!(summary.completed, "{:?}", summary.error);
-    assert_eq!(cause(&record), Cause::None);
-    let (summary, record) = run_of(scenario, &["drivesheartbeat:loss@0.4s"], 5);
-    assert!(!summary.completed && summary.at_rest);
-    assert_eq!(cause(&record), Cause::PeerSilent);
 }
 
 /// The node's frames wait behind those that it sends without end; the drives let go as if it were silent.
@@ -321,6 +283,14 @@ fn a_node_without_power_starts_anew() {
         (0.5..0.502).contains(&time) && number <= 1,
         "{time} {number}"
     );
+    // Back while the controller still counts on them, they are not switched on by its stop.
+    let (summary, record) = gate("drives:dead@0.4s..0.45s");
+    assert!(!summary.completed && summary.at_rest);
+    let after = record.truths.iter().filter(|it| it.plant.t > 0.4015);
+    assert!(after.clone().count() > 100);
+    for it in after {
+        assert_eq!(it.plant.tau, [0.0; 4], "{}", it.plant.t);
+    }
 
     let (summary, record) = gate("controller:dead@0.4s..0.5s");
     assert!(!summary.completed && summary.at_rest);

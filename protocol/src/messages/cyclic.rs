@@ -154,5 +154,7 @@ bits! {
         DAMPED = 12, "damped";
         /// A lost sample was bridged by prediction.
         PREDICTED = 13, "predicted";
+        /// Moves begin more slowly than they were planned, because a motor is warm.
+        WARM = 14, "warm";
     }
 }

@@ -68,6 +68,14 @@ pub enum Unit {
     MetrePerSecond,
     /// rad/s or m/s: the axis is not known.
     SpeedOfAxis,
+    /// N m.
+    NewtonMetre,
+    /// N.
+    Newton,
+    /// N m or N: the axis is not known.
+    Effort,
+    /// Share, %.
+    Percent,
     /// ms.
     Millisecond,
     /// Consecutive frames.
@@ -92,6 +100,10 @@ impl Unit {
             Self::RadianPerSecond => "rad/s",
             Self::MetrePerSecond => "m/s",
             Self::SpeedOfAxis => "rad/s or m/s",
+            Self::NewtonMetre => "N m",
+            Self::Newton => "N",
+            Self::Effort => "N m or N",
+            Self::Percent => "%",
             Self::Millisecond => "ms",
             Self::Frame => "frames",
         }
@@ -106,7 +118,10 @@ impl Unit {
                 write!(f, "{value:.2} {}", self.symbol())
             }
             Self::RadianOrMetre | Self::SpeedOfAxis => write!(f, "{value:.4} {}", self.symbol()),
-            Self::Millisecond => write!(f, "{value:.1} ms"),
+            Self::Millisecond | Self::NewtonMetre | Self::Newton | Self::Effort => {
+                write!(f, "{value:.1} {}", self.symbol())
+            }
+            Self::Percent => write!(f, "{value:.0} %"),
             Self::Frame => write!(f, "{value:.0} frames in a row"),
             Self::DriveStatus => {
                 f.write_str("drive status")?;
@@ -172,6 +187,10 @@ impl Fault {
                 Lift => Unit::Metre,
                 _ => Unit::Radian,
             },
+            (Cause::Collision, None) => Unit::Effort,
+            (Cause::Collision, Lift) => Unit::Newton,
+            (Cause::Collision, _) => Unit::NewtonMetre,
+            (Cause::Chatter | Cause::Overload, _) => Unit::Percent,
             (Cause::OverSpeed, None) => Unit::SpeedOfAxis,
             (Cause::OverSpeed, Lift | Tool) => Unit::MetrePerSecond,
             (Cause::OverSpeed, _) => Unit::RadianPerSecond,

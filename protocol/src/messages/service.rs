@@ -233,15 +233,22 @@ codes! {
         EncoderFault = 19, "encoder-fault";
         /// The operator's heartbeat was heard, and has stopped.
         OperatorSilent = 20, "operator-silent";
+        /// An axis moves otherwise than by its torque and the model: it has met something, or its encoder is late.
+        Collision = 21, "collision";
+        /// The torque of an axis swings from sample to sample: its loop is not stable.
+        Chatter = 22, "chatter";
+        /// A motor is hotter than it may be for ever, and moving more slowly has not helped.
+        Overload = 23, "overload";
     }
 }
 
 impl Cause {
-    /// Emergency error code (CiA 301 table of codes; 7300h, 83xxh, 84xxh and 86xxh from CiA 402).
+    /// Emergency error code (CiA 301 table of codes; 2310h, 7300h, 83xxh, 84xxh and 86xxh from CiA 402).
     #[must_use]
     pub const fn error_code(self) -> u16 {
         match self {
             Self::None => 0x0000,
+            Self::Overload => 0x2310,
             Self::DriveFault => 0x5000,
             Self::SelfTest | Self::Overrun => 0x6100,
             Self::SchemaMismatch => 0x6300,
@@ -252,7 +259,9 @@ impl Cause {
             Self::DuplicateNode => 0x8150,
             Self::Reordered | Self::Corrupted | Self::BadValue => 0x8200,
             Self::FeedbackLost => 0x8250,
+            Self::Chatter => 0x8300,
             Self::OverTorque => 0x8311,
+            Self::Collision => 0x8331,
             Self::OverSpeed => 0x8400,
             Self::FollowingError => 0x8611,
             Self::SoftLimit => 0x8612,
@@ -260,11 +269,12 @@ impl Cause {
         }
     }
 
-    /// Error register (CiA 301 object 1001h): bit 0 generic, bit 4 communication, bit 5 device profile.
+    /// Error register (CiA 301 object 1001h): bit 0 generic, bit 1 current, bit 4 communication, bit 5 device profile.
     #[must_use]
     pub const fn error_register(self) -> u8 {
         match self.error_code() {
             0x0000 => 0,
+            0x2310 => 1 | 1 << 1,
             0x8100..=0x82FF => 1 | 1 << 4,
             0x7300 | 0x8300..=0x86FF => 1 | 1 << 5,
             _ => 1,

@@ -88,6 +88,8 @@ parameters! {
         SpeedFactor = 0x0028, "speed-factor", "", Always, real(0.05, 1.5, 1.1);
         /// Samples in a row beyond a limit before the arm is stopped.
         FaultSamples = 0x0029, "fault-samples", "samples", Always, whole(1.0, 20.0, 3.0);
+        /// Effort that the model does not explain and that stops the arm, as a share of the joint's limit.
+        CollisionLimit = 0x002A, "collision-limit", "", Always, real(0.05, 10.0, 0.8);
         /// Time allowed for the brake to open or close; the brake of the lift needs 50 ms.
         BrakeDelay = 0x0030, "brake-delay", "s", AtRest, real(0.05, 1.0, 0.06);
         /// Age of the feedback at which the drives count as silent: torque off, brake.
@@ -98,10 +100,12 @@ parameters! {
         BadFrames = 0x0033, "bad-frames", "frames", Always, whole(1.0, 20.0, 3.0);
         /// Time in one move at a torque limit of an axis that hardly moves that stops the arm.
         SaturationTime = 0x0034, "saturation-time", "s", Always, real(0.02, 10.0, 0.2);
+        /// Time constant with which a motor warms up and cools down.
+        ThermalTime = 0x0035, "thermal-time", "s", Always, real(1.0, 3600.0, 30.0);
         /// Time without a heartbeat after which a node whose heartbeat was heard counts as silent.
-        HeartbeatTimeout = 0x0035, "heartbeat-timeout", "s", Always, real(0.12, 5.0, 0.25);
+        HeartbeatTimeout = 0x0036, "heartbeat-timeout", "s", Always, real(0.12, 5.0, 0.25);
         /// Time for which one hold lets moves go on in manual operation.
-        HoldTime = 0x0036, "hold-time", "s", AtRest, real(0.05, 0.5, 0.15);
+        HoldTime = 0x0037, "hold-time", "s", AtRest, real(0.05, 0.5, 0.15);
     }
 }
 

@@ -69,6 +69,7 @@ impl Controller {
             qdd_ahead: reference.qdd,
             lead: 0.0,
             period: 1e-3,
+            elapsed: 1e-3,
             excess: Vector4::zeros(),
         };
         let trig = Trig::new(&q);
@@ -77,6 +78,7 @@ impl Controller {
             task: &Task::new(&ARM.geometry, &trig, &motion),
             model: &Model::new(&self.body, &trig, &motion),
             nominal_inertia: &self.body.nominal_inertia,
+            disturbance: &Vector4::zeros(),
         };
         self.selection.torque(&input, &mut Memory::new()).cast()
     }

@@ -1,7 +1,9 @@
 //! Which requests an operator may make in which state.
 
 use nalgebra::Vector4;
-use protocol::messages::{Compensation, MotionRequest, Refusal, RefusalReason};
+use protocol::messages::{
+    Compensation, MotionReply, MotionRequest, Outcome, Refusal, RefusalReason,
+};
 
 use super::Controller;
 use crate::control::laws::{Gains, Memory, Selection};
@@ -19,6 +21,44 @@ pub(super) enum Answer {
 }
 
 impl Controller {
+    /// Number of replies to send.
+    pub fn answers_waiting(&self) -> usize {
+        self.replies.len()
+    }
+
+    /// Requests that were never answered, because too many replies were waiting.
+    pub fn unanswered(&self) -> u16 {
+        self.unanswered
+    }
+
+    /// The next reply to send to an operator.
+    pub fn take_reply(&mut self) -> Option<MotionReply> {
+        self.replies.pop_front()
+    }
+
+    /// Refuses a request without examining it further.
+    pub fn refuse(&mut self, sequence: u8, refusal: Refusal) {
+        self.reply(sequence, Outcome::Refused(refusal));
+    }
+
+    /// Accepts or refuses an operator's request. [`Controller::take_reply`] has the answer at once, or for a move once
+    /// it has been planned.
+    pub fn request(&mut self, sequence: u8, request: &MotionRequest) {
+        match self.accept(sequence, request) {
+            Ok(Answer::Now) => self.reply(sequence, Outcome::Accepted),
+            Ok(Answer::WhenPlanned | Answer::Never) => {}
+            Err(refusal) => self.reply(sequence, Outcome::Refused(refusal)),
+        }
+    }
+
+    pub(super) fn reply(&mut self, sequence: u8, outcome: Outcome) {
+        let reply = MotionReply { sequence, outcome };
+        // The outbox has room for the replies to everything that can wait to be planned, and as many again.
+        if self.replies.push_back(reply).is_err() {
+            self.unanswered = self.unanswered.saturating_add(1);
+        }
+    }
+
     pub(super) fn accept(
         &mut self,
         sequence: u8,

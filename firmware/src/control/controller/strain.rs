@@ -1,9 +1,10 @@
-//! What follows where an axis would need more torque than there is.
+//! What follows where an axis would need more torque than there is, for an instant or for ever, or where its torque swings.
 
 use nalgebra::Vector4;
-use protocol::messages::{Cause, Fault};
+use protocol::messages::{Cause, Fault, LimitFlags};
 
 use super::Controller;
+use crate::control::fault::{CHATTER_PERCENT, OVERLOAD_PERCENT};
 use crate::control::readings::Readings;
 use crate::control::states::State;
 use crate::mechanics::arm::Axis;
@@ -73,6 +74,35 @@ impl Controller {
                 self.blame(axis, fault);
             }
         }
+    }
+
+    /// Follows the heat of the motors. Too much of it slows down the moves that begin from now on, and what that does not cool stops the arm.
+    pub(super) fn warm(&mut self, effort: &Vector4<f32>, steps: u32) {
+        let elapsed = self.config.period.seconds() * steps as f32;
+        let part = elapsed / self.setup.thermal_time;
+        let continuous = &self.config.arm.limits.effort_continuous;
+        let (axis, heat) = self.heat.update(effort, continuous, part);
+        let limit = f32::from(OVERLOAD_PERCENT);
+        if heat > limit * 1e-2 {
+            self.blame(axis, Fault::value(Cause::Overload, heat * 100.0, limit));
+        }
+        let pace = self.heat.pace();
+        if pace < 1.0 {
+            self.limits = self.limits | LimitFlags::WARM;
+        }
+        self.queue.set_cool_pace(pace);
+    }
+
+    /// Whether the torques do not chatter.
+    pub(super) fn is_even(&mut self, motor_torque: &Vector4<f32>) -> bool {
+        let period = self.config.period.seconds();
+        let limit = &self.config.arm.drive.motor_torque_limit;
+        let Some((axis, percent)) = self.chatter.update(motor_torque, limit, period) else {
+            return true;
+        };
+        let limit = f32::from(CHATTER_PERCENT);
+        self.blame(axis, Fault::value(Cause::Chatter, percent, limit));
+        self.state.is_powered()
     }
 
     fn blame(&mut self, axis: Axis, fault: Fault) {

@@ -93,6 +93,10 @@ impl Controller {
         {
             self.fail(fault);
         }
+        let (disturbance, wanted) = (self.memory.disturbance(), &self.setpoint.reference.qd);
+        if let Some(fault) = self.monitor.feel(readings, qd, disturbance, &error, wanted) {
+            self.fail(fault);
+        }
     }
 
     /// Counts down the time of the brake. One that has not closed by then does not hold the lift: torque goes on holding it,

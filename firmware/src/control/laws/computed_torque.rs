@@ -21,7 +21,7 @@ pub fn torque(
     if compensation == Compensation::Integral {
         acceleration += memory.integrate(&motion.position_error(), motion) * gains.integral();
     }
-    realise(input, &acceleration, gains, compensation, memory)
+    realise(input, &acceleration, compensation)
 }
 
 /// Joint accelerations of the reference, corrected by its errors.
@@ -36,14 +36,12 @@ pub(super) fn acceleration(motion: &Motion<'_>, gains: &Gains) -> Vector4<f32> {
 pub(super) fn realise(
     input: &ControlInput<'_>,
     acceleration: &Vector4<f32>,
-    gains: &Gains,
     compensation: Compensation,
-    memory: &mut Memory,
 ) -> Vector4<f32> {
-    let ControlInput { motion, model, .. } = *input;
+    let model = input.model;
     let torque = &model.mass * acceleration + model.bias + model.gravity + model.friction;
     if compensation == Compensation::Observer {
-        torque - memory.observer.update(motion, model, gains.observer)
+        torque - input.disturbance
     } else {
         torque
     }

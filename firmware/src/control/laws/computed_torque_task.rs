@@ -28,5 +28,5 @@ pub fn torque(
     let acceleration = task.joint_space(&(desired - carried + pull), || {
         computed_torque::acceleration(motion, gains)
     });
-    computed_torque::realise(input, &acceleration, gains, compensation, memory)
+    computed_torque::realise(input, &acceleration, compensation)
 }

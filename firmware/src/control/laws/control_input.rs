@@ -23,6 +23,8 @@ pub struct ControlInput<'a> {
     pub model: &'a Model,
     /// Inertia of each axis by itself, for laws without a model.
     pub nominal_inertia: &'a Vector4<f32>,
+    /// Efforts that the model does not explain, by the [observer](super::observer): N m, N m, N, N m.
+    pub disturbance: &'a Vector4<f32>,
 }
 
 /// Motion in joint space: shoulder, elbow, lift (positive down), wrist in rad, rad, m, rad and their derivatives in time;
@@ -47,6 +49,8 @@ pub struct Motion<'a> {
     pub lead: f32,
     /// Sampling period, s.
     pub period: f32,
+    /// Time since the last sample that has arrived, s.
+    pub elapsed: f32,
     /// What the limits cut off the efforts of the last sample; 0 where nothing was cut.
     pub excess: Vector4<f32>,
 }

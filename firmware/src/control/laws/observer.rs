@@ -34,6 +34,11 @@ impl MomentumObserver {
         }
     }
 
+    /// Estimated disturbance at the joints in the last sample.
+    pub fn residual(&self) -> &Vector4<f32> {
+        &self.residual
+    }
+
     /// Estimated disturbance at the joints after one more sample, positive along +q.
     ///
     /// The corner is bounded to half a radian per sample, where the discrete filter still behaves like the continuous
@@ -60,7 +65,7 @@ impl MomentumObserver {
         let share = motion.lead / period;
         let friction = last + (before - last) * if share < 1.0 { share } else { 1.0 };
         let known = model.gravity + friction;
-        self.expected += (torque + model.kinetic_gradient - known + self.residual) * period;
+        self.expected += (torque + model.kinetic_gradient - known + self.residual) * motion.elapsed;
         let greatest = 0.5 / period;
         let corner = if corner < greatest { corner } else { greatest };
         self.residual = (momentum - self.expected) * corner;
