@@ -8,7 +8,7 @@
     reason = "a test fails by panicking"
 )]
 
-use protocol::messages::{Cause, DriveStatus, Emergency, Fault, FaultAxis, KnownAnswer};
+use protocol::messages::*;
 
 /// Expected sentences written by hand.
 #[test]
@@ -89,4 +89,26 @@ fn an_emergency_keeps_the_value() {
     let nonsense = Emergency::new(Cause::OverSpeed, f32::NAN.to_bits());
     assert_eq!(nonsense.value(), 0.0);
     assert_eq!(nonsense.fault().to_string(), "over speed");
+}
+
+#[test]
+fn names_of_codes_are_found_again() {
+    for &law in Law::ALL {
+        assert_eq!(Law::from_name(law.name()), Some(law));
+        assert_eq!(Law::try_from(law.code()), Ok(law));
+    }
+    for &compensation in Compensation::ALL {
+        assert_eq!(
+            Compensation::from_name(compensation.name()),
+            Some(compensation)
+        );
+    }
+    assert_eq!(Law::from_name("PID"), None);
+    assert!(Law::try_from(Law::ALL.len() as u8).is_err());
+    for &cause in Cause::ALL {
+        assert!(cause.describe().ends_with('.'), "{cause}");
+    }
+    for &reason in RefusalReason::ALL {
+        assert!(reason.describe().ends_with('.'), "{reason}");
+    }
 }

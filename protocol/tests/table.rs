@@ -308,28 +308,6 @@ fn names_are_unique_and_identifiers_in_order() {
     }
 }
 
-#[test]
-fn names_of_codes_are_found_again() {
-    for &law in Law::ALL {
-        assert_eq!(Law::from_name(law.name()), Some(law));
-        assert_eq!(Law::try_from(law.code()), Ok(law));
-    }
-    for &compensation in Compensation::ALL {
-        assert_eq!(
-            Compensation::from_name(compensation.name()),
-            Some(compensation)
-        );
-    }
-    assert_eq!(Law::from_name("PID"), None);
-    assert!(Law::try_from(Law::ALL.len() as u8).is_err());
-    for &cause in Cause::ALL {
-        assert!(cause.describe().ends_with('.'), "{cause}");
-    }
-    for &reason in RefusalReason::ALL {
-        assert!(reason.describe().ends_with('.'), "{reason}");
-    }
-}
-
 /// Whatever changes the meaning of a byte changes the hash.
 #[test]
 fn the_hash_sees_every_part_of_the_table() {

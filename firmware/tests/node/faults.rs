@@ -7,8 +7,8 @@ use nalgebra::Vector4;
 use protocol::e2e::Profile;
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, ControlWord, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode,
-    MotionRequest, Node as Name, Outcome, State,
+    Cause, DriveStatus, Emergency, KnownAnswer, LimitFlags, Message, Mode, MotionRequest,
+    Node as Name, Outcome, State,
 };
 use protocol::time::Period;
 
@@ -293,38 +293,6 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
         };
         assert_eq!(state.fault().to_string(), expected);
     }
-}
-
-/// Drives that have missed commands go on with the next one, from where the arm has coasted to: that has to be a fault.
-#[test]
-fn drives_that_switch_off_by_themselves_are_a_fault() {
-    let mut bench = Bench::moving();
-    bench.obeys = false;
-    bench.step();
-    bench.obeys = true;
-    let words = bench.words(200);
-    assert_eq!(
-        words.first(),
-        Some(&ControlWord::TORQUE_ENABLE),
-        "the brake closes at once"
-    );
-    assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
-    assert_eq!(bench.mode(), Mode::Fault);
-    let status = "drive fault: drive status ready encoder-valid";
-    assert_eq!(bench.node.controller().fault().to_string(), status);
-}
-
-/// Nobody else says so, and the next word of a controller that is switching off would bring their torque back.
-#[test]
-fn drives_that_switch_off_before_they_are_told_to_are_a_fault() {
-    let mut bench = Bench::enabled();
-    let frame = bench.motion(MotionRequest::Disable);
-    bench.wire.to_node.push_back(frame);
-    bench.step();
-    assert_eq!(bench.mode(), Mode::Disabling);
-    bench.obeys = false;
-    bench.run(2);
-    assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
 }
 
 /// 2 x 1.1 x 12.2 rad/s is 27 mrad in a sample, at whatever rate and after however many lost samples; the following error is allowed

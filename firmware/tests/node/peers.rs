@@ -207,3 +207,35 @@ fn the_time_without_a_heartbeat_is_a_parameter() {
         assert!((-2.5e-3..12e-3).contains(&late), "{samples} {timeout}");
     }
 }
+
+/// Drives that have missed commands go on with the next one, from where the arm has coasted to: that has to be a fault.
+#[test]
+fn drives_that_switch_off_by_themselves_are_a_fault() {
+    let mut bench = Bench::moving();
+    bench.obeys = false;
+    bench.step();
+    bench.obeys = true;
+    let words = bench.words(200);
+    assert_eq!(
+        words.first(),
+        Some(&ControlWord::TORQUE_ENABLE),
+        "the brake closes at once"
+    );
+    assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
+    assert_eq!(bench.mode(), Mode::Fault);
+    let status = "drive fault: drive status ready encoder-valid";
+    assert_eq!(bench.node.controller().fault().to_string(), status);
+}
+
+/// Nobody else says so, and the next word of a controller that is switching off would bring their torque back.
+#[test]
+fn drives_that_switch_off_before_they_are_told_to_are_a_fault() {
+    let mut bench = Bench::enabled();
+    let frame = bench.motion(MotionRequest::Disable);
+    bench.wire.to_node.push_back(frame);
+    bench.step();
+    assert_eq!(bench.mode(), Mode::Disabling);
+    bench.obeys = false;
+    bench.run(2);
+    assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
+}

@@ -13,7 +13,7 @@ use std::io;
 use proptest::prelude::*;
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{Message, Mode, MotionRequest, Operation, Posture};
+use protocol::messages::{Message, Mode, MotionRequest, Posture};
 use protocol::time::{Duration, Instant};
 use sim::controller::InProcess;
 use sim::live::Live;
@@ -351,62 +351,4 @@ proptest! {
         let own: Vec<&str> = answers.iter().filter(own).map(|answer| answer.text.as_str()).collect();
         prop_assert!(own.len() >= asked.len() + 2, "{:?} for {:?}", own, asked);
     }
-}
-
-/// A person presses a button of an axis: it goes on as long as the page says that it is pressed, and in automatic operation not at all.
-#[test]
-fn an_axis_moves_as_long_as_its_button_is_held() {
-    let (mut run, mut seen) = standing();
-    let shoulder = |seen: &Seen| seen.truth.unwrap().plant.q[0];
-    let mut target = seen.truth.unwrap().plant.q.map(|q| q as f32);
-    target[0] = 2.6;
-    let jog = Order::Jog(MotionRequest::MoveJoint { target, speed: 1.0 });
-    let hold = |run: &mut Live<'_>, seen: &mut Seen, seconds: f64| {
-        for _ in 0..(seconds / 0.05) as u32 {
-            run.order(Order::Request(MotionRequest::Hold));
-            live(run, seen, 0.05);
-        }
-    };
-    run.order(jog);
-    let answers = live(&mut run, &mut seen, 0.2);
-    assert!(
-        !answers[0].good && answers[0].text.contains("manual operation"),
-        "{answers:?}"
-    );
-    assert!(seen.requests.is_empty(), "nothing goes out");
-
-    let operation = Operation::Manual;
-    run.order(Order::Request(MotionRequest::SetOperation { operation }));
-    // Not before the controller has said so.
-    run.order(jog);
-    let answers = live(&mut run, &mut seen, 0.2);
-    assert_eq!(
-        answers.iter().filter(|answer| answer.good).count(),
-        1,
-        "{answers:?}"
-    );
-    let start = shoulder(&seen);
-    run.order(jog);
-    live(&mut run, &mut seen, 0.5);
-    assert!((shoulder(&seen) - start).abs() < 1e-4, "not held");
-    hold(&mut run, &mut seen, 1.0);
-    let held = shoulder(&seen);
-    // 225 mm/s at half a metre for nearly a second.
-    assert!((0.2..0.6).contains(&(held - start)), "{start} {held}");
-    // The page is closed.
-    live(&mut run, &mut seen, 0.3);
-    let rest = shoulder(&seen);
-    live(&mut run, &mut seen, 1.0);
-    assert!(
-        (shoulder(&seen) - rest).abs() < 1e-4 && rest - held < 0.1,
-        "{held} {rest}"
-    );
-    // Let go of: a stop, after which a late hold moves nothing.
-    hold(&mut run, &mut seen, 0.2);
-    run.order(Order::Request(MotionRequest::Stop));
-    hold(&mut run, &mut seen, 0.3);
-    let rest = shoulder(&seen);
-    hold(&mut run, &mut seen, 0.5);
-    assert_eq!(seen.mode(), Mode::Enabled);
-    assert!((shoulder(&seen) - rest).abs() < 1e-4);
 }
