@@ -289,7 +289,7 @@ impl Node {
         self.samples = self.samples.wrapping_add(1);
         let planned = if self.samples.is_multiple_of(REPORT_SAMPLES) {
             self.listen(feedback.sample);
-            self.controller.tend();
+            self.controller.tend(REPORT_SAMPLES);
             false
         } else {
             self.controller.plan()

@@ -13,12 +13,12 @@ mod common;
 
 use common::planned::{joints, plan, robot, two_kg};
 use firmware::mechanics::arm::{ArmModel, IRB_930, Payload};
-use firmware::mechanics::body::Body;
+use firmware::mechanics::body::{Body, TORQUE_SHARE};
 use firmware::mechanics::dynamics::newton_euler;
 use firmware::mechanics::kinematics::{self, Pose};
 use firmware::trajectory::queue::{MoveQueue, Progress, Stride};
 use firmware::trajectory::request::{Request, Target};
-use firmware::trajectory::torque_budget::{TORQUE_SHARE, TorqueBudget};
+use firmware::trajectory::torque_budget::TorqueBudget;
 use firmware::trajectory::{Reference, Setpoint};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;

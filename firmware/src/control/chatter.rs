@@ -40,6 +40,11 @@ impl Chatter {
         self.oldest = if self.oldest < 2 { self.oldest + 1 } else { 0 };
     }
 
+    /// Motor torques of the last three samples, N m, in no order.
+    pub fn torques(&self) -> &[Vector4<f32>; 3] {
+        &self.torques
+    }
+
     /// Looks at the last three samples, `period` seconds apart. Returns the axis that swings most and the mean swing of all (%) if that is too
     /// much.
     pub fn look(&mut self, limit: &Vector4<f32>, period: f32) -> Option<(Axis, f32)> {

@@ -196,7 +196,6 @@ impl Controller {
         if readings.steps > 1 {
             self.bridge(readings.steps);
         }
-        self.heat.add(&measured_torque);
         self.watch(readings, &q, &qd);
         self.wait(readings);
         if !self.state.is_powered() {

@@ -14,12 +14,9 @@ const HOT: f32 = 1.0;
 /// Least pace for want of cooling. A motor that is too hot even so holds a load that is too heavy.
 const LEAST_PACE: f32 = 0.3;
 
-/// Heat of the motors.
+/// Heat of the motors: of some samples in a row, now and then.
 #[derive(Clone, Copy, Debug)]
 pub struct Heat {
-    /// Squares of the efforts since the last account, and how many.
-    squares: Vector4<f32>,
-    samples: u32,
     /// Mean square of the effort over the continuous one.
     shares: Vector4<f32>,
 }
@@ -28,8 +25,6 @@ impl Heat {
     /// Motors that have not done anything for long.
     pub fn new() -> Self {
         Self {
-            squares: Vector4::zeros(),
-            samples: 0,
             shares: Vector4::zeros(),
         }
     }
@@ -39,27 +34,25 @@ impl Heat {
         &self.shares
     }
 
-    /// Takes the efforts of a sample, N m (lift N).
-    pub fn add(&mut self, effort: &Vector4<f32>) {
-        self.squares += effort.component_mul(effort);
-        self.samples = self.samples.saturating_add(1);
-    }
-
-    /// Accounts for what was taken since the last time; `part` is a sample's share of the time constant. Returns the warmest axis.
-    pub fn account(&mut self, continuous: &Vector4<f32>, part: f32) -> (Axis, f32) {
-        let samples = self.samples as f32;
-        let passed = clamp(samples * part, 0.0, 1.0);
+    /// Accounts for a part of the time constant in which the efforts were like these, N m (lift N). Returns the warmest axis.
+    pub fn account(
+        &mut self,
+        efforts: &[Vector4<f32>],
+        continuous: &Vector4<f32>,
+        part: f32,
+    ) -> (Axis, f32) {
+        let part = clamp(part / efforts.len() as f32, 0.0, 1.0);
+        for effort in efforts {
+            let share = effort.component_div(continuous);
+            self.shares += (share.component_mul(&share) - self.shares) * part;
+        }
         let mut warmest = (Axis::Shoulder, 0.0);
         for axis in Axis::ALL {
-            let continuous = axis.of(continuous);
-            let mean = axis.of(&self.squares) / (continuous * continuous * samples);
-            let share = axis.of_mut(&mut self.shares);
-            *share += (mean - *share) * passed;
-            if *share > warmest.1 {
-                warmest = (axis, *share);
+            let share = axis.of(&self.shares);
+            if share > warmest.1 {
+                warmest = (axis, share);
             }
         }
-        (self.squares, self.samples) = (Vector4::zeros(), 0);
         warmest
     }
 }

@@ -13,6 +13,10 @@ use crate::mechanics::kinematics::Trig;
 /// Torques of the four joints (N m, lift N) and of the motor of the wrist (N m), which carries part of the lift's force, too.
 pub type Torques = Vector5<f32>;
 
+/// Share of the torque that a plan may use. The rest is for feedback control: payload and friction are never known
+/// exactly, and a saturated axis leaves the path.
+pub const TORQUE_SHARE: f32 = 0.945;
+
 /// Everything that depends on the payload, lumped once instead of in every tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Body {
@@ -23,6 +27,8 @@ pub struct Body {
     /// Greatest torques (N m, lift N): of the joints, as they and the motors that turn one joint each allow, and of the motor of the
     /// wrist.
     pub torque_limit: Torques,
+    /// What a plan may use of them.
+    pub planned_torque: Torques,
     /// How fast they change at the most (N m/s, lift N/s).
     pub torque_rate: Torques,
     /// Rotor inertia seen at the joints, A^T Jm A.
@@ -45,6 +51,7 @@ impl Body {
             lagrange: Lagrange::new(arm, payload),
             drive,
             torque_limit,
+            planned_torque: torque_limit * TORQUE_SHARE,
             torque_rate: Torques::new(
                 torque_limit.x / rise.x,
                 torque_limit.y / rise.y,

@@ -28,7 +28,7 @@ use super::path::{Path, PathPoint};
 use super::profile::{Bounds, HalfBounds, SCurve};
 use super::request::{Request, Target, from_path};
 use super::torque_budget::TorqueBudget;
-use super::{Reference, Trajectory};
+use super::{Lift, Reference, Trajectory};
 use crate::mechanics::arm::ArmModel;
 use jump::{Chamfer, Jump};
 use verify::{Before, HALF_STEPS, LINE_STEPS};
@@ -288,7 +288,12 @@ impl Planner {
         self.jump = gate.map(|gate| Jump::new(gate, self.slow_tool));
         self.draft.path = path;
         self.draft.start = 0.0;
-        self.draft.lift = None;
+        self.draft.lift = self.jump.is_some().then(|| Lift {
+            from: self.draft.end.z,
+            up: SCurve::default(),
+            down: SCurve::default(),
+            down_start: 0.0,
+        });
         self.draft.time_scale = 1.0;
         // For a path along which nothing moves.
         self.draft.profile = SCurve::default();

@@ -11,9 +11,6 @@ use crate::mechanics::body::{Body, Torques};
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::{cbrt, clamp, least};
 
-/// Share of the torque that a plan may use. The rest is for feedback control: payload and friction are never known
-/// exactly, and a saturated axis leaves the path.
-pub const TORQUE_SHARE: f32 = 0.945;
 /// Share of the torque's rate of change that a profile may use. The rest is for what lies between two samples.
 const RATE_SHARE: f32 = 0.95;
 
@@ -80,7 +77,7 @@ impl TorqueBudget<'_> {
         let mut need = self.need(here, along.v);
         need.push *= along.a;
         // Not by `rooms`, which looks both ways: it costs 190 instructions more in what is the dearest step of planning.
-        let limits = self.torque_limits();
+        let limits = &self.body.planned_torque;
         let mut room = f32::MAX;
         for ((push, rest), limit) in need.push.iter().zip(need.rest.iter()).zip(limits.iter()) {
             let (need, rest) = if *push < 0.0 {
@@ -151,7 +148,7 @@ impl TorqueBudget<'_> {
     // Out of line, for the size of one copy.
     #[inline(never)]
     fn rooms(&self, need: &Need) -> (f32, f32) {
-        let limits = self.torque_limits();
+        let limits = &self.body.planned_torque;
         let (mut down, mut up) = (f32::MAX, f32::MAX);
         for ((push, rest), limit) in need.push.iter().zip(need.rest.iter()).zip(limits.iter()) {
             let (low, high) = (limit + rest, limit - rest);
@@ -172,7 +169,7 @@ impl TorqueBudget<'_> {
     /// [`RefusalReason::TorqueTooSmall`] with the axis and the torque, which no time scale reduces.
     pub fn check_creep(&self) -> Result<(), Refusal> {
         let torque = self.body.lagrange.gravity().abs() + self.arm.drive.coulomb;
-        let limits = self.torque_limits();
+        let limits = &self.body.planned_torque;
         let refuse = |axis: Axis, value: f32, limit: f32| {
             Err(Refusal {
                 reason: RefusalReason::TorqueTooSmall,
@@ -202,7 +199,7 @@ impl TorqueBudget<'_> {
         let full = self.load(&Trig::relative(&reference.q), reference);
         let dry = self.body.drive.coulomb_friction(&reference.qd);
         let smooth = full - self.torques(&dry);
-        let limits = self.torque_limits();
+        let limits = &self.body.planned_torque;
         // Nearly every sample keeps its limits as it is: then there is nothing to solve.
         let scale = if within(&full, &limits) {
             1.0
@@ -230,10 +227,6 @@ impl TorqueBudget<'_> {
     }
 
     /// Torques that a plan or a stop may use.
-    fn torque_limits(&self) -> Torques {
-        self.body.torque_limit * TORQUE_SHARE
-    }
-
     fn torques(&self, joint: &Vector4<f32>) -> Torques {
         Torques::new(joint.x, joint.y, joint.z, joint.w, self.wrist_motor(joint))
     }
@@ -268,7 +261,7 @@ impl TorqueBudget<'_> {
         let limits = &self.arm.limits;
         let mass = self.body.nominal_inertia.z;
         let gravity = self.body.lagrange.gravity().z;
-        let force = self.torque_limits().z;
+        let force = self.body.planned_torque.z;
         let cap = limits.acceleration.z.min((force + gravity.abs()) / mass);
         let coulomb = self.arm.drive.coulomb.z;
         let viscous = self.arm.drive.viscous.z;

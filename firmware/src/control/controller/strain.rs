@@ -79,16 +79,20 @@ impl Controller {
 
     /// What need not be done in every sample. Looks for chatter, and accounts for the heat of the motors: too much of it slows down the moves
     /// that begin from now on, and what that does not cool stops the arm.
-    pub fn tend(&mut self) {
+    /// It stands for `samples` samples.
+    pub fn tend(&mut self, samples: u32) {
         let period = self.config.period.seconds();
         let limit = &self.config.arm.drive.motor_torque_limit;
         if let Some((axis, percent)) = self.chatter.look(limit, period) {
             let limit = f32::from(CHATTER_PERCENT);
             self.blame(axis, Fault::value(Cause::Chatter, percent, limit));
         }
-        let part = period / self.setup.thermal_time;
+        let drive = &self.body.drive;
+        let torques = self.chatter.torques();
+        let efforts = torques.map(|torque| drive.joint_torque(&torque));
+        let part = samples as f32 * period / self.setup.thermal_time;
         let continuous = &self.config.arm.limits.effort_continuous;
-        let (axis, heat) = self.heat.account(continuous, part);
+        let (axis, heat) = self.heat.account(&efforts, continuous, part);
         let limit = f32::from(OVERLOAD_PERCENT);
         if heat > limit * 1e-2 {
             self.blame(axis, Fault::value(Cause::Overload, heat * 100.0, limit));

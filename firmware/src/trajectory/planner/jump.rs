@@ -13,7 +13,6 @@
 use super::{NO_TRAVEL, Planner, Stage};
 use crate::mechanics::arm::ArmModel;
 use crate::mechanics::math::{least, sin_cos, sqrt};
-use crate::trajectory::Lift;
 use crate::trajectory::path::Path;
 use crate::trajectory::profile::{Bounds, SCurve};
 use crate::trajectory::request::Gate;
@@ -179,15 +178,9 @@ impl Planner {
     /// The profile of one vertical stroke.
     #[inline(never)]
     pub(super) fn stroke(&mut self, budget: &TorqueBudget<'_>, down: bool) {
-        let (Some(jump), Path::Joint { start, .. }) = (&self.jump, &self.draft.path) else {
+        let (Some(jump), Some(lift)) = (&self.jump, &mut self.draft.lift) else {
             return;
         };
-        let lift = self.draft.lift.get_or_insert(Lift {
-            from: start.z,
-            up: SCurve::default(),
-            down: SCurve::default(),
-            down_start: 0.0,
-        });
         let profile = stroke(jump.height(down) + jump.raise, &jump.bounds(budget, down));
         self.stage = if down {
             lift.down = profile.reversed();
