@@ -89,7 +89,7 @@ parameters! {
         /// Samples in a row beyond a limit before the arm is stopped.
         FaultSamples = 0x0029, "fault-samples", "samples", Always, whole(1.0, 20.0, 3.0);
         /// Effort that the model does not explain and that stops the arm, as a share of the joint's limit.
-        CollisionLimit = 0x002A, "collision-limit", "", Always, real(0.05, 10.0, 0.8);
+        CollisionLimit = 0x002A, "collision-limit", "", Always, real(0.05, 10.0, 0.5);
         /// Time allowed for the brake to open or close; the brake of the lift needs 50 ms.
         BrakeDelay = 0x0030, "brake-delay", "s", AtRest, real(0.05, 1.0, 0.06);
         /// Age of the feedback at which the drives count as silent: torque off, brake.

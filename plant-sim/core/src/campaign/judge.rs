@@ -316,7 +316,9 @@ impl Judge {
     fn judge_fall(&mut self) {
         // An arm that went on moved as it was meant to.
         let went_on = self.report.is_none() && self.missed.contains(&Requirement::Latch);
-        if !went_on && self.lift.drop() > self.bounds.drop(self.lift.speed()) {
+        // A spring pulls it back to where it caught the tool.
+        let pulled = self.faults.catch_the_tool();
+        if !went_on && !pulled && self.lift.drop() > self.bounds.drop(self.lift.speed()) {
             self.miss(Requirement::Drop);
         }
         let is_controlled = self.cut.is_none()

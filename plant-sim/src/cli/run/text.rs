@@ -186,7 +186,7 @@ fn load(summary: &Summary, text: &mut String) {
     if summary.pace < 1.0 {
         line!(
             text,
-            "  pace              down to {:.0} % of the planned speed: an override, a move that was not held, or too little torque, as under a heavier load",
+            "  pace              down to {:.0} % of the planned speed: an override, a move that was not held, warm motors, or too little torque, as under a heavier load",
             summary.pace * 100.0
         );
     }
