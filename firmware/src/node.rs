@@ -30,8 +30,8 @@ use peers::Pulse;
 
 /// Default age of the feedback at which the drives count as silent: torque off, brake.
 pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
-/// Planning pauses every tenth sample, for what need not be looked at more often, and so that no report waits longer: half the period of the state at 1 kHz, for a
-/// tenth of the planning. Counted in samples and not in time, so that the same feedback gives the same torques.
+/// Planning pauses every tenth sample, for what need not be looked at more often, and so that no report waits longer: half the
+/// period of the state at 1 kHz, for a tenth of the planning. Counted in samples and not in time, so that the same feedback gives the same torques.
 const REPORT_SAMPLES: u32 = 10;
 /// Answers that may wait for such a sample; with more, reports are sent in spite of planning. Two leave room in the
 /// outbox for a request in every sample until then.

@@ -36,7 +36,7 @@ estop           at once      emergency stop emergency stop emergency stop reset
 drive-fault     at once      brake          brake          nothing        reset
 encoder-fault   at once      off            off            off            reset
 collision       each axis    stop           off            off            reset
-chatter         40 %         off            off            off            reset
+chatter         80 %         off            off            off            reset
 overload        120 %        stop           nothing        nothing        reset
 ";
 

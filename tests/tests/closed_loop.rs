@@ -214,13 +214,13 @@ fn a_fault_is_named_by_axis_value_and_limit() {
     let summary = in_process(&RunConfig::new(scenario), &mut ()).unwrap();
     assert!(!summary.completed);
     let fault = &summary.faults[0];
-    assert_eq!(fault.cause, "following-error");
+    assert_eq!(fault.cause, "collision");
     let axis = fault.axis.expect("one axis is to blame");
     assert!(fault.value.abs() > fault.limit && fault.limit > 0.0);
-    assert_eq!(fault.unit, if axis == "lift" { "m" } else { "rad" });
+    assert_eq!(fault.unit, if axis == "lift" { "N" } else { "N m" });
     let begins = format!(
-        "following error, axis {} ({axis}): ",
-        fault.text.as_bytes()[22] - b'0'
+        "collision, axis {} ({axis}): ",
+        fault.text.as_bytes()["collision, axis ".len()] - b'0'
     );
     assert!(fault.text.starts_with(&begins), "{}", fault.text);
     assert!(fault.text.contains(", limit "), "{}", fault.text);

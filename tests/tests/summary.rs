@@ -56,7 +56,7 @@ impl Observer for Effort {
 fn a_motor_at_its_limit_is_seen_as_long_as_it_is_there() {
     let mut scenario = scenario(
         "[payload]\nmass = 2.0\ncom_flange_frame = [0.0, 0.0, 0.05]\ninertia_com_diag = [0.008, 0.008, 0.01]\n\
-         [mismatch]\nfriction = 10\npayload = 10\n\
+         [mismatch]\nfriction = 6\npayload = 6\n\
          [[cycle]]\nline = { to = [0.6, 0.1, -0.2, 0.0] }\n",
     );
     scenario.rate_hz = 1000.0;

@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn time_is_the_number_of_samples_and_never_runs_backwards() {
         let mut clock = SampleClock::new(Period::of_rate(1000.0));
-        // Sample number, expected time in samples: gaps count, old samples and a restart do not.
+        // Sample number, expected time in samples: gaps count, an old sample and the first of a restart do not.
         for (sample, expected) in [(7, 0), (8, 1), (11, 4), (10, 4), (12, 5), (0, 5), (1, 6)] {
             clock.observe(&feedback(sample));
             assert_eq!(

@@ -33,8 +33,9 @@ pub const SATURATION_MS: u32 = milliseconds(Parameter::SaturationTime);
 /// three last no longer than an allowed gap.
 pub const BAD_FRAMES: u8 = Parameter::BadFrames.initial(1.0) as u8;
 
-/// Swing of the torques from sample to sample that stops the arm, %: see [`Chatter`](super::chatter::Chatter).
-pub const CHATTER_PERCENT: u16 = 40;
+/// Swing of the torques from sample to sample that stops the arm, %, as [`Chatter`](super::chatter::Chatter) counts it: a fifth of one motor's
+/// limit to both sides. Encoders that are off by two counts make half of that at 2 kHz.
+pub const CHATTER_PERCENT: u16 = 80;
 /// Heat of a motor that stops the arm, % of what it may have for ever: see [`Heat`](super::heat::Heat).
 pub const OVERLOAD_PERCENT: u16 = 120;
 

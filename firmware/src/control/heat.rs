@@ -59,7 +59,8 @@ impl Heat {
 
 /// Pace at which moves may begin when the warmest motor has this heat.
 pub fn pace(heat: f32) -> f32 {
-    clamp((HOT - heat) / (HOT - WARM), LEAST_PACE, 1.0)
+    let slower = (heat - WARM) / (HOT - WARM) * (1.0 - LEAST_PACE);
+    clamp(1.0 - slower, LEAST_PACE, 1.0)
 }
 
 impl Default for Heat {

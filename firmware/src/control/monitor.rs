@@ -32,8 +32,8 @@ impl MonitorLimits {
     /// Limits of the bench. Following error: 0.05 rad is 53 mm at the flange of the stretched arm, which the kinematic
     /// laws keep (20 mm RMS in the gate); computed torque uses a hundredth of it. Speed: a tenth above what a plan may
     /// use. Range: the stopping distance from a fifth of full speed, so that overshoot at a limit does not trip. Three
-    /// samples: two can be noise. Collision: 10 kg more than were announced at full speed are half of the limit, a payload and
-    /// friction that are a third wrong a fifth.
+    /// samples: two can be noise. Collision: 10 kg more than were announced come near half of the limit at full speed, a
+    /// payload and friction that are a third wrong to a fifth.
     pub const DEFAULT: Self = Self {
         following_error: Vector4::new(
             Parameter::FollowingErrorShoulder.initial(1.0),
@@ -221,12 +221,13 @@ impl Monitor {
         count(&mut self.collision_count, Some(axis), self.needed)?;
         // Readings of whatever axis that do not go where it went until now are not those of an obstacle, which only slows it down in so few
         // samples.
-        let wanted = self.wanted;
+        let (wanted, now) = (self.wanted, wanted);
         let slow = self.speed * SLOW;
         let was_to_move = |axis: &Axis| axis.of(&wanted).abs() > axis.of(&slow);
         let mut moving = Axis::ALL.into_iter().filter(was_to_move);
         let mut stands = moving.clone().chain([axis]);
-        let turned = |axis: &Axis| axis.of(qd) * axis.of(&wanted) < 0.0;
+        let goes_on = |axis: &Axis| axis.of(now) * axis.of(&wanted) > 0.0;
+        let turned = |axis: &Axis| goes_on(axis) && axis.of(qd) * axis.of(&wanted) < 0.0;
         Some(
             if let Some(axis) = stands.find(|axis| readings.is_still(*axis)) {
                 of_axis(Cause::StuckSensor, axis, error, &Vector4::zeros())

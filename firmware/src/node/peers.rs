@@ -69,8 +69,10 @@ impl Node {
             let timeout = self.controller.setup().heartbeat_timeout;
             if age > timeout {
                 pulse.forget();
-                self.controller
-                    .fail(Fault::value(cause, age * 1e3, timeout * 1e3));
+                if self.controller.state().is_powered() {
+                    let fault = Fault::value(cause, age * 1e3, timeout * 1e3);
+                    self.controller.fail(fault);
+                }
             }
         }
     }

@@ -54,7 +54,7 @@ pub struct MoveQueue {
     asked: f32,
     /// Pace at which the torque was found to suffice.
     found: f32,
-    /// Pace at which the motors do not get too hot. Only moves that begin follow it.
+    /// Pace at which the motors do not get too hot. Moves that begin follow it, and one under way whose pace changes for another reason.
     cool: f32,
     /// In manual operation: whether somebody holds it.
     held: Option<bool>,

@@ -12,10 +12,10 @@ use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::{cbrt, clamp, least};
 
 /// Share of the torque's rate of change that a profile may use. The rest is for what lies between two samples.
-const RATE_SHARE: f32 = 0.95;
+const RATE_SHARE: f32 = 0.935;
 
 /// The same for the mean over a step of the last pass; above it, so that this pass does not slow down what just keeps it.
-const VERIFIED_RATE: f32 = 0.955;
+const VERIFIED_RATE: f32 = 0.939;
 /// Share of the torque's rate of change that a stop may use: the move's own change keeps the rest.
 pub(super) const STOP_SHARE: f32 = 0.5;
 /// The same for another pace, which nobody needs at once: what a plan leaves.
@@ -201,7 +201,7 @@ impl TorqueBudget<'_> {
         let smooth = full - self.torques(&dry);
         let limits = &self.body.planned_torque;
         // Nearly every sample keeps its limits as it is: then there is nothing to solve.
-        let scale = if within(&full, &limits) {
+        let scale = if within(&full, limits) {
             1.0
         } else {
             // tau(x) = a x² + b x + c. Coulomb friction does not depend on x.
@@ -226,7 +226,6 @@ impl TorqueBudget<'_> {
         if ratio < 1.0 { cbrt(ratio) } else { 1.0 }
     }
 
-    /// Torques that a plan or a stop may use.
     fn torques(&self, joint: &Vector4<f32>) -> Torques {
         Torques::new(joint.x, joint.y, joint.z, joint.w, self.wrist_motor(joint))
     }

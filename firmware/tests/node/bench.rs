@@ -52,8 +52,6 @@ pub(crate) struct Bench {
     pub sequence: u8,
     pub position: [i32; 4],
     pub velocity: [f32; 4],
-    /// What the drives report, of a thousandth of the rated torque.
-    pub torque: [i16; 4],
     /// What the drives report besides whether torque is on.
     pub status: DriveStatus,
     /// Whether the drives do what the control word says.
@@ -79,7 +77,6 @@ impl Bench {
             sequence: 0,
             position: [0; 4],
             velocity: [0.0; 4],
-            torque: [0; 4],
             status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
             obeys: true,
             follows: false,
@@ -165,7 +162,7 @@ impl Bench {
             status: self.status.with(DriveStatus::TORQUE_ON, is_on),
             position: self.position,
             velocity: self.velocity,
-            torque: self.torque,
+            torque: [0; 4],
         };
         let frame = encode(&Message::Feedback(feedback), self.feedback_counter).unwrap();
         self.sample += 1;

@@ -34,7 +34,6 @@ const MOVE_LIMIT_S: f64 = 120.0;
 const ANY_MOVE_LIMIT_S: f64 = 1e9;
 /// Time without any frame after which the controller counts as silent: ten heartbeats.
 const SILENCE_LIMIT: Duration = Duration::from_secs(1);
-
 /// Its first heartbeat comes between those of the drives.
 const FIRST_HEARTBEAT: Instant = Instant::from_nanos(50_000_000);
 

@@ -53,6 +53,7 @@ impl Controller {
     /// Nobody holds a move any more.
     pub(super) fn let_go(&mut self) {
         self.loosen(u32::MAX);
+        self.too_fast = 0;
     }
 
     /// Judges the velocity of the flange, measured: x, y, z in m/s, yaw in rad/s.

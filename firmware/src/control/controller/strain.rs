@@ -89,7 +89,8 @@ impl Controller {
         }
         let drive = &self.body.drive;
         let torques = self.chatter.torques();
-        let efforts = torques.map(|torque| drive.joint_torque(&torque));
+        // Of each motor by itself.
+        let efforts = torques.map(|torque| drive.own_torque(&torque));
         let part = samples as f32 * period / self.setup.thermal_time;
         let continuous = &self.config.arm.limits.effort_continuous;
         let (axis, heat) = self.heat.account(&efforts, continuous, part);

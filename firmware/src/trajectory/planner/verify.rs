@@ -13,7 +13,7 @@ use crate::trajectory::{Reference, Trajectory};
 
 /// Most steps of the last pass between the borders of the travel's segments; more along a line, where the joints have extrema of
 /// their own.
-const JOINT_STEPS: u8 = 16;
+const JOINT_STEPS: u8 = 24;
 pub(super) const LINE_STEPS: u8 = 24;
 /// Least steps along a line while it speeds up, and while it brakes.
 pub(super) const HALF_STEPS: u8 = 12;

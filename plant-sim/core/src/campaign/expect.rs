@@ -22,7 +22,7 @@
 //! | a clock within 100 ppm, as every crystal is | the same as without it | nobody else counts on a time |
 //! | a foreign node sends a right frame of the controller for 17 samples or more | 16 samples | the controller hears it; on the beat of its own frames only after 32 attempts |
 //! | heartbeats of drives or operator gone for up to 100 ms | the same as without it | the next one is there after 200 ms at most |
-//! | the same for 350 ms or more; the operator silent for as long | 250 ms and 4 samples | one that was heard is waited for so long |
+//! | the same for 350 ms or more; the operator silent for as long | 250 ms and 13 samples | one that was heard is waited for so long, looked at in every tenth sample |
 //! | nobody tells a CAN controller to recover | the same as without it | nothing by itself: only after a bus-off |
 //!
 //! Whatever else breaks is judged by its effect: see [`super::bounds`].
@@ -88,7 +88,8 @@ fn of(fault: &Spell, period: Period) -> Expected {
         if lasts <= Duration::from_millis(100) {
             Expected::Survived
         } else if lasts >= Duration::from_millis(350) {
-            Expected::DetectedBy(fault.from + Duration::from_millis(250) + samples(4))
+            // Looked at in every tenth sample.
+            Expected::DetectedBy(fault.from + Duration::from_millis(250) + samples(13))
         } else {
             Expected::Either
         }
@@ -196,5 +197,6 @@ pub(super) fn stops_under_control(cause: Cause) -> bool {
             | Cause::Corrupted
             | Cause::SoftLimit
             | Cause::EStop
+            | Cause::Overload
     )
 }

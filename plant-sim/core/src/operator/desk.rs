@@ -76,6 +76,8 @@ pub struct Desk {
     orders: VecDeque<Order>,
     open: VecDeque<Open>,
     answers: Vec<Answer>,
+    /// Whether the controller has had a request: numbers begin anew after 255.
+    introduced: bool,
 }
 
 impl Desk {
@@ -90,6 +92,7 @@ impl Desk {
             orders: VecDeque::new(),
             open: VecDeque::new(),
             answers: Vec::new(),
+            introduced: false,
         }
     }
 
@@ -304,7 +307,8 @@ impl Peer for Desk {
                 self.operator.tick(now, out);
                 if let Some(order) = self.orders.pop_front() {
                     // The controller treats an operator's first request as a possible replay.
-                    let first = self.operator.sequence == 0;
+                    let first = !self.introduced && self.operator.sequence == 0;
+                    self.introduced = true;
                     if first && !matches!(order, Order::EmergencyStop | Order::Scenario) {
                         self.orders.push_front(order);
                         self.obey(now, Order::Request(MotionRequest::Stop), out);
