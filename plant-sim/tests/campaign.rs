@@ -15,7 +15,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// Few cases. One of the robots, with fifty times the friction of the model, cannot survive what a sound one does.
+/// Few cases. One of the robots, with ten times the friction of the model, cannot survive what a sound one does.
 const CASES: &str = r#"
 faults = ["feedback:duplicate", "feedback:corrupt"]
 lasts_ms = [12, 0]
@@ -28,7 +28,7 @@ begin_ms = { from = 525, until = 529, step = 2 }
 [[situation]]
 name = "rusty"
 scenario = "gate"
-set = ["cycles=1", "mismatch.friction=50"]
+set = ["cycles=1", "mismatch.friction=10"]
 begin_ms = { from = 525, until = 529, step = 2 }
 "#;
 

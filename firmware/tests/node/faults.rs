@@ -12,7 +12,7 @@ use protocol::messages::{
 };
 use protocol::time::Period;
 
-use crate::bench::{Bench, PERIOD, SILENCE, estop, heartbeat, is_off};
+use crate::bench::{Bench, PERIOD, SILENCE, by_itself, estop, heartbeat, is_off};
 
 fn emergencies(sent: &[Message]) -> Vec<Emergency> {
     sent.iter()
@@ -130,10 +130,9 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             Bench::with(Config::new(arm, PERIOD))
         }
         Cause::Overload => {
-            // Its weight of 41 N is more than the motor of the lift may hold for ever.
-            let mut arm = IRB_930;
-            arm.limits.effort_continuous.z = 30.0;
-            let mut config = Config::new(arm, PERIOD);
+            // Its weight of 20 N is more than the motor of the lift may hold for ever.
+            let mut config = by_itself();
+            config.arm.limits.effort_continuous.z = 15.0;
             config.setup.thermal_time = 1.0;
             let mut bench = Bench::with(config);
             bench.enable();

@@ -144,13 +144,13 @@ fn a_node_without_power_starts_anew() {
         assert_eq!(it.plant.tau, [0.0; 4], "{}", it.plant.t);
     }
 
-    let (summary, record) = gate("controller:dead@0.4s..0.5s");
+    let (summary, record) = gate("controller:dead@0.45s..0.55s");
     assert!(!summary.completed && summary.at_rest);
     assert!(summary.error.unwrap().contains("started anew"));
     let modes: Vec<Mode> = record
         .truths
         .iter()
-        .filter(|it| it.plant.t > 0.51)
+        .filter(|it| it.plant.t > 0.56)
         .map(|it| it.mind.mode)
         .collect();
     assert!(
