@@ -54,9 +54,13 @@ impl Chatter {
 
     /// Looks at the last samples, `period` seconds apart. Returns the axis that swings most and the mean swing of all (%) if that is too much.
     pub fn look(&mut self, limit: &Vector4<f32>, period: f32) -> Option<(Axis, f32)> {
-        let mut torques = self.torques;
-        torques.rotate_left(usize::from(self.oldest));
-        let [a, b, c, d] = torques;
+        let [a, b, c, d] = self.torques;
+        let [a, b, c, d] = match self.oldest {
+            0 => [a, b, c, d],
+            1 => [b, c, d, a],
+            2 => [c, d, a, b],
+            _ => [d, a, b, c],
+        };
         let before = (a - b * 2.0 + c).abs();
         let now = (b - c * 2.0 + d).abs();
         let swings = before.sup(&now).component_div(limit);
