@@ -111,7 +111,7 @@ def number(rng):
 
 
 # A tag that no request has; padding that is not zero; a line and a payload that cannot be.
-malformed = motion(4, b"\0\x0b")
+malformed = motion(4, b"\0\x7f")
 not_canonical = motion(5, b"\0\x01\0\0\x01")
 out_of_range = motion(7, b"\0\x07", struct.pack("<f", -1.0))
 
