@@ -8,42 +8,26 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "common/gate.rs"]
+mod gate;
 #[path = "common/record.rs"]
 mod record;
 
 use std::collections::BTreeMap;
 
+use gate::{cause, gate};
 use protocol::codec::{self, Encoder};
 use protocol::frame::CanFrame;
 use protocol::messages::{Cause, Command, ControlWord, Message, Mode, Node};
 use protocol::table;
 use protocol::time::{Duration, Instant};
-use record::{Record, run_of};
+use record::Record;
 use sim::faults::Faulty;
 use sim::peer::{Outbox, Peer, PeerError};
 use sim::rig::Rig;
 use sim::scenario::Scenario;
 use sim::setup::RunConfig;
-use sim::summary::Summary;
 use sim::world::{Mind, World};
-
-fn gate(fault: &str) -> (Summary, Record) {
-    let mut scenario = Scenario::built_in("gate").unwrap();
-    scenario.cycles = 1;
-    run_of(scenario, &[fault], 5)
-}
-
-fn cause(record: &Record) -> Cause {
-    let causes =
-        record
-            .frames
-            .iter()
-            .filter_map(|(_, frame)| match codec::decode(frame).ok()?.message {
-                Message::Emergency(_, emergency) => Some(emergency.cause),
-                _ => None,
-            });
-    causes.into_iter().next().unwrap_or(Cause::None)
-}
 
 /// Numbers the commands that it sends, one a call.
 struct Counter(u32, Encoder);

@@ -8,16 +8,20 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "common/live.rs"]
+mod live;
+
 use std::io;
 
+use live::live;
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{Message, Mode, MotionRequest, Operation};
-use protocol::time::{Duration, Instant};
+use protocol::time::Instant;
 use sim::controller::InProcess;
 use sim::live::Live;
 use sim::observer::{Observer, Truth};
-use sim::operator::{Answer, Order};
+use sim::operator::Order;
 use sim::scenario::Scenario;
 use sim::setup::RunConfig;
 
@@ -38,17 +42,6 @@ impl Observer for Record {
         self.truths.push(*truth);
         Ok(())
     }
-}
-
-/// Lives for this long; returns what was answered.
-fn live(run: &mut Live<'_>, seen: &mut Record, seconds: f64) -> Vec<Answer> {
-    let until = run.now() + Duration::from_seconds(seconds);
-    let mut answers = Vec::new();
-    while run.now() < until {
-        run.step(&mut (), seen).unwrap();
-        answers.extend(run.answers());
-    }
-    answers
 }
 
 /// A run after its scenario, the axes under torque.

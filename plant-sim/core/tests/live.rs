@@ -8,8 +8,12 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "common/live.rs"]
+mod live;
+
 use std::io;
 
+use live::live;
 use proptest::prelude::*;
 use protocol::codec;
 use protocol::frame::CanFrame;
@@ -72,17 +76,6 @@ impl Observer for Seen {
 
 fn begin(config: &RunConfig) -> Live<'static> {
     Live::new(config, |config| Ok(InProcess::new(config))).unwrap()
-}
-
-/// Lives for this long; returns what was answered.
-fn live(run: &mut Live<'_>, seen: &mut Seen, seconds: f64) -> Vec<Answer> {
-    let until = run.now() + Duration::from_seconds(seconds);
-    let mut answers = Vec::new();
-    while run.now() < until {
-        run.step(&mut (), seen).unwrap();
-        answers.extend(run.answers());
-    }
-    answers
 }
 
 /// A run after its scenario, the axes under torque.

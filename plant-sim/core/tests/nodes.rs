@@ -8,34 +8,18 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "common/gate.rs"]
+mod gate;
 #[path = "common/record.rs"]
 mod record;
 
+use gate::{cause, gate};
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{Cause, Message, Mode, Node};
 use protocol::table;
-use record::{Record, run_of};
+use record::run_of;
 use sim::scenario::Scenario;
-use sim::summary::Summary;
-
-fn gate(fault: &str) -> (Summary, Record) {
-    let mut scenario = Scenario::built_in("gate").unwrap();
-    scenario.cycles = 1;
-    run_of(scenario, &[fault], 5)
-}
-
-fn cause(record: &Record) -> Cause {
-    let causes =
-        record
-            .frames
-            .iter()
-            .filter_map(|(_, frame)| match codec::decode(frame).ok()?.message {
-                Message::Emergency(_, emergency) => Some(emergency.cause),
-                _ => None,
-            });
-    causes.into_iter().next().unwrap_or(Cause::None)
-}
 
 /// Nobody else sends those, and no node receives its own: the arm stops under control.
 #[test]
