@@ -7,6 +7,7 @@
 mod parameters;
 mod peers;
 mod report;
+mod shell;
 
 use nalgebra::Vector4;
 use protocol::bus::Transmit;
@@ -18,6 +19,7 @@ use protocol::messages::{
     Cause, Command, DriveStatus, Fault, Feedback, Message, Mode, Motion, MotionRequest, NmtCommand,
     Node as Name, ParameterReply, Refusal, RefusalReason, ResetReason, Server,
 };
+use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use crate::control::controller::{Config, Controller};
@@ -51,13 +53,18 @@ pub struct Node {
     received: Counters,
     unsent: u16,
     bad_feedback: u8,
+    /// Frames since the newest feedback that are no message, saturating.
+    strangers: u16,
     /// Sample number and arrival of the newest feedback.
     newest: Option<(u32, Instant)>,
     /// Number of samples answered.
     samples: u32,
-    /// Whether the drives were built from the same message table.
-    same_schema: bool,
+    /// Message table that the drives were built from, once they have said so.
+    schema: Option<u32>,
     overruns: u16,
+    /// Ticks in a row that took too long, and whether the last one did.
+    overruns_in_a_row: u8,
+    has_overrun: bool,
     worst_tick: u32,
     /// Why the node was started, and whether network management has requested a reset.
     reset: ResetReason,
@@ -83,10 +90,13 @@ impl Node {
             received: Counters::default(),
             unsent: 0,
             bad_feedback: 0,
+            strangers: 0,
             newest: None,
             samples: 0,
-            same_schema: false,
+            schema: None,
             overruns: 0,
+            overruns_in_a_row: 0,
+            has_overrun: false,
             worst_tick: 0,
             reset,
             reset_asked: false,
@@ -108,22 +118,6 @@ impl Node {
     /// Frames that could not be sent so far, including answers to a flood of requests.
     pub fn unsent(&self) -> u16 {
         self.unsent.saturating_add(self.controller.unanswered())
-    }
-
-    /// For a shell to report a tick that ended after its deadline.
-    pub fn count_overrun(&mut self) {
-        self.overruns = self.overruns.saturating_add(1);
-    }
-
-    /// For a shell to report the core cycles of a tick, if it can measure them; the maximum is kept.
-    pub fn note_tick(&mut self, cycles: u32) {
-        self.worst_tick = self.worst_tick.max(cycles);
-    }
-
-    /// Whether network management has requested a reset: the shell then has to start a new node. This one sends nothing
-    /// more.
-    pub fn reset_asked(&self) -> bool {
-        self.reset_asked
     }
 
     /// Processes the frame that has arrived, if any, and sends whatever is due to `bus`. `now` must never run
@@ -261,8 +255,11 @@ impl Node {
             Some((last, _)) => feedback.sample.wrapping_sub(last).max(1),
         };
         self.newest = Some((feedback.sample, now));
+        let missing = self.why_missing();
+        self.strangers = 0;
+        self.end_overruns();
         if self.controller.mode() == Mode::PreOperational
-            && self.same_schema
+            && self.schema == Some(table::HASH)
             && feedback.status.contains(DriveStatus::ENCODER_VALID)
         {
             self.controller.event(Event::PeerReady);
@@ -271,6 +268,7 @@ impl Node {
         let [t1, t2, t3, t4] = feedback.torque.map(f32::from);
         let readings = Readings {
             steps,
+            missing,
             status: feedback.status,
             counts: feedback.position,
             velocity: Vector4::from(feedback.velocity),
@@ -307,7 +305,7 @@ impl Node {
         if edge && verdict == Verdict::Initial {
             self.controller
                 .refuse(motion.sequence, Refusal::because(RefusalReason::WrongState));
-        } else if edge && !self.same_schema {
+        } else if edge && self.schema.is_some_and(|schema| schema != table::HASH) {
             self.controller.refuse(
                 motion.sequence,
                 Refusal::because(RefusalReason::SchemaMismatch),

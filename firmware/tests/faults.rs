@@ -21,6 +21,9 @@ mod table;
 const ORACLE: &str = "
 self-test       at once      nothing        nothing        nothing        restart
 feedback-lost   5 ms         stop           brake          nothing        reset
+babbling        5 ms         stop           brake          nothing        reset
+bus-off         at once      stop           brake          nothing        reset
+overrun         5 samples    stop           brake          nothing        reset
 peer-silent     100 ms       off            off            off            reset
 operator-silent 250 ms       stop           nothing        nothing        reset
 reordered       3 frames     stop           brake          nothing        reset
@@ -45,6 +48,7 @@ fn limit(limit: Limit) -> String {
         Limit::AtOnce => "at once".into(),
         Limit::Milliseconds(ms) => format!("{ms} ms"),
         Limit::Frames(frames) => format!("{frames} frames"),
+        Limit::Samples(samples) => format!("{samples} samples"),
         Limit::Percent(share) => format!("{share} %"),
         Limit::EachAxis => "each axis".into(),
     }
@@ -72,6 +76,9 @@ fn seen_by(cause: Cause) -> &'static str {
     match cause {
         Cause::SelfTest => "known answers of mathematics, kinematics and CRC; ranges of the model",
         Cause::FeedbackLost => "sample number of the next feedback",
+        Cause::Babbling => "as before, with more than 15 frames meanwhile that are no message",
+        Cause::BusOff => "CAN controller",
+        Cause::Overrun => "time of a sample",
         Cause::PeerSilent => {
             "age of the feedback; of the heartbeat of the drives, as of the operator's"
         }

@@ -16,12 +16,7 @@ use std::path::Path;
 
 use protocol::messages::{Cause, ParameterError, RefusalReason};
 
-const CAUSES: [Cause; 4] = [
-    Cause::Babbling,
-    Cause::BusOff,
-    Cause::Overrun,
-    Cause::SchemaMismatch,
-];
+const CAUSES: [Cause; 0] = [];
 const LIMIT_FLAGS: [&str; 9] = [
     "VELOCITY_SHOULDER",
     "VELOCITY_ELBOW",

@@ -346,6 +346,15 @@ impl Peer for Qemu {
         Ok(())
     }
 
+    fn bus_off(&mut self) -> Result<(), PeerError> {
+        // A serial-line adapter has no word for it.
+        if self.channel == Some(Channel::Fifo) {
+            self.twin.bus_off();
+            self.board.send_request(&Request::BusOff)?;
+        }
+        Ok(())
+    }
+
     fn finish(&mut self) -> Result<(), PeerError> {
         self.catch_up(0)
     }

@@ -52,6 +52,11 @@ impl Twin {
         self.due.extend(self.sent.drain(..));
     }
 
+    /// Tells the twin, as the other, that its CAN controller has gone bus-off.
+    pub fn bus_off(&mut self) {
+        self.controller.bus_off();
+    }
+
     /// Compares a frame of the other with the next one expected.
     ///
     /// # Errors

@@ -194,7 +194,7 @@ impl Controller {
         let measured_torque = drive.joint_torque(&readings.torque);
 
         if readings.steps > 1 {
-            self.bridge(readings.steps);
+            self.bridge(readings.steps, readings.missing);
         }
         self.watch(readings, &q, &qd);
         self.wait(readings);

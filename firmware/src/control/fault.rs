@@ -32,6 +32,9 @@ pub const SATURATION_MS: u32 = milliseconds(Parameter::SaturationTime);
 /// Consecutive rejected, stale or repeated feedback frames that stop the arm: two can be noise, and even at 500 Hz
 /// three last no longer than an allowed gap.
 pub const BAD_FRAMES: u8 = Parameter::BadFrames.initial(1.0) as u8;
+/// Ticks in a row that take too long, and stop the arm: as many as samples for which the drives hold a command. A computer without a real-time
+/// system is late now and then.
+pub const OVERRUNS: u8 = 5;
 
 /// Swing of the torques from sample to sample that stops the arm, %, as [`Chatter`](super::chatter::Chatter) counts it: a fifth of one motor's
 /// limit to both sides. Encoders that are off by two counts make half of that at 2 kHz.
@@ -53,6 +56,8 @@ pub enum Limit {
     Milliseconds(u32),
     /// This many frames in a row.
     Frames(u8),
+    /// This many samples in a row.
+    Samples(u8),
     /// More than this share, %.
     Percent(u16),
     /// [`MonitorLimits`](super::monitor::MonitorLimits): a limit per axis, for a number of consecutive samples.
@@ -117,15 +122,28 @@ const fn row(
 }
 
 /// Every cause that the controller raises.
-pub static REACTIONS: [Row; 19] = {
+pub static REACTIONS: [Row; 22] = {
     use Latch::{Reset, Restart};
-    use Limit::{AtOnce, EachAxis, Frames, Milliseconds, Percent};
+    use Limit::{AtOnce, EachAxis, Frames, Milliseconds, Percent, Samples};
     use Reaction::{Brake, EmergencyStop, None, Off, Stop};
     [
         row(Cause::SelfTest, AtOnce, [None, None, None], Restart),
         row(
             Cause::FeedbackLost,
             Milliseconds(MAX_GAP_MS),
+            [Stop, Brake, None],
+            Reset,
+        ),
+        row(
+            Cause::Babbling,
+            Milliseconds(MAX_GAP_MS),
+            [Stop, Brake, None],
+            Reset,
+        ),
+        row(Cause::BusOff, AtOnce, [Stop, Brake, None], Reset),
+        row(
+            Cause::Overrun,
+            Samples(OVERRUNS),
             [Stop, Brake, None],
             Reset,
         ),

@@ -33,7 +33,7 @@ impl Node {
         };
         let reply = match *request {
             ParameterRequest::Hello(peer) => {
-                self.same_schema = peer.schema == table::HASH;
+                self.schema = Some(peer.schema);
                 ParameterReply::Hello(table::HELLO)
             }
             // The first frame of an operator may be a replay: it must not change anything.

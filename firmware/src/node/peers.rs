@@ -10,6 +10,10 @@ use protocol::time::{Duration, Instant};
 
 use super::Node;
 
+/// Frames without a feedback among them that are no message of the bench: a node floods the bus. Every message of the bench fits in
+/// between more than once, and a frame that is repeated because of an error is received once.
+const FLOOD: u16 = 16;
+
 /// The heartbeat of another node. As CiA 301 has it, it is watched from the first one on that was heard.
 #[derive(Clone, Debug)]
 pub(super) struct Pulse {
@@ -79,6 +83,7 @@ impl Node {
 
     pub(super) fn reject(&mut self, error: DecodeError, frame: &CanFrame) {
         self.received.refuse(&error);
+        self.strangers = self.strangers.saturating_add(1);
         if table::FEEDBACK.identifies(frame) {
             self.suspect(match error {
                 DecodeError::Value(_) | DecodeError::Malformed | DecodeError::NotCanonical => {
@@ -109,6 +114,15 @@ impl Node {
         }
     }
 
+    /// Why feedback is missing: somebody else may fill the bus.
+    pub(super) fn why_missing(&self) -> Cause {
+        if self.strangers < FLOOD {
+            Cause::FeedbackLost
+        } else {
+            Cause::Babbling
+        }
+    }
+
     /// Checks the age of the feedback.
     pub(super) fn guard(&mut self, now: Instant) {
         let Some((_, arrived)) = self.newest else {
@@ -118,6 +132,11 @@ impl Node {
         let timeout = self.controller.setup().feedback_timeout;
         if age > Duration::from_micros(u64::from((timeout * 1e6) as u32)) {
             let age_ms = age.nanos() as f32 * 1e-6;
+            // First what is to blame. Without feedback there is no stop, so the silence follows in any case.
+            if self.why_missing() == Cause::Babbling {
+                let fault = Fault::value(Cause::Babbling, age_ms, timeout * 1e3);
+                self.controller.fail(fault);
+            }
             self.controller
                 .fail(Fault::value(Cause::PeerSilent, age_ms, timeout * 1e3));
             self.newest = None;
@@ -125,7 +144,7 @@ impl Node {
             self.drives.forget();
             self.operator.forget();
             self.drives_parameter.reset();
-            self.same_schema = false;
+            self.schema = None;
         }
     }
 }

@@ -10,7 +10,7 @@ use firmware::trajectory::Reference;
 use nalgebra::Vector4;
 use protocol::bus::{Transmit, TransmitError};
 use protocol::codec::{decode, encode};
-use protocol::frame::CanFrame;
+use protocol::frame::{CanFrame, StandardId};
 use protocol::messages::{
     Cause, Command, Compensation, ControlWord, DriveStatus, EStop, EStopReason, Feedback,
     Heartbeat, Hello, Message, Mode, Motion, MotionRequest, Node as Name, Outcome,
@@ -217,6 +217,13 @@ impl Bench {
     pub(crate) fn lose(&mut self) {
         self.next_feedback();
         self.now += self.period;
+    }
+
+    /// Frames of a node that floods the bus.
+    pub(crate) fn babble(&mut self, frames: usize) {
+        let id = StandardId::new(0).expect("11 bits");
+        let frame = CanFrame::classical(id, &[0; 8]).expect("eight bytes");
+        self.wire.to_node.extend([frame].repeat(frames));
     }
 
     /// Control words of the next samples.

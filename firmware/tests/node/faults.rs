@@ -121,7 +121,7 @@ fn not_a_number(good: &CanFrame) -> CanFrame {
     CanFrame::fd(good.id(), &bytes, true).unwrap()
 }
 
-/// A node that has just met with this cause, and what it has sent; `None` for a reserved cause.
+/// A node that has just met with this cause, and what it has sent; `None` for none.
 fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
     let mut bench = match cause {
         Cause::SelfTest => {
@@ -148,6 +148,23 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
         Cause::SelfTest => bench.poll(),
         Cause::FeedbackLost => {
             (0..6).for_each(|_| bench.lose());
+            bench.step()
+        }
+        Cause::Babbling => {
+            (0..6).for_each(|_| bench.lose());
+            bench.babble(16);
+            bench.step()
+        }
+        Cause::BusOff => {
+            bench.node.bus_off();
+            bench.step()
+        }
+        Cause::Overrun => {
+            for _ in 0..4 {
+                bench.node.count_overrun();
+                bench.step();
+            }
+            bench.node.count_overrun();
             bench.step()
         }
         Cause::PeerSilent => {
@@ -238,9 +255,7 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             })
             .collect(),
         Cause::Overload => bench.run(3000),
-        Cause::None | Cause::Babbling | Cause::BusOff | Cause::Overrun | Cause::SchemaMismatch => {
-            return None;
-        }
+        Cause::None => return None,
     };
     Some((bench, sent))
 }
@@ -264,6 +279,9 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
         let expected = match cause {
             Cause::SelfTest => format!("self test: {}", KnownAnswer::Model),
             Cause::FeedbackLost => "feedback lost: 7.0 ms, limit 5.0 ms".into(),
+            Cause::Babbling => "babbling: 7.0 ms, limit 5.0 ms".into(),
+            Cause::BusOff => "bus off".into(),
+            Cause::Overrun => "overrun: 5 samples in a row, limit 5 samples in a row".into(),
             Cause::PeerSilent => "peer silent: 100.0 ms, limit 100.0 ms".into(),
             Cause::OperatorSilent => "operator silent: 258.0 ms, limit 250.0 ms".into(),
             Cause::Reordered => "reordered: 3 frames in a row".into(),

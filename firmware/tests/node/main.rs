@@ -17,6 +17,7 @@ mod parameters;
 mod peers;
 mod reports;
 mod requests;
+mod shell;
 mod stops;
 mod switching;
 mod wire;

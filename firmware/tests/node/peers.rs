@@ -12,7 +12,7 @@ use protocol::messages::{
 };
 use protocol::table::{self, TABLE};
 
-use crate::bench::{Bench, PERIOD, heartbeat};
+use crate::bench::{Bench, PERIOD, SILENCE, heartbeat};
 
 /// One frame of every message that the controller alone sends, by name: what a second controller on the bus sends.
 fn frames_of_a_controller() -> BTreeMap<&'static str, CanFrame> {
@@ -238,4 +238,37 @@ fn drives_that_switch_off_before_they_are_told_to_are_a_fault() {
     bench.obeys = false;
     bench.run(2);
     assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
+}
+
+/// A gap in which the bus is full of frames that are no message is somebody's who sends them; one in which an operator asks for much
+/// is not.
+#[test]
+fn a_gap_is_told_from_a_flooded_bus() {
+    for (frames, silent, expected) in [
+        (15, false, Cause::FeedbackLost),
+        (16, false, Cause::Babbling),
+        (15, true, Cause::PeerSilent),
+        (16, true, Cause::Babbling),
+    ] {
+        let mut bench = Bench::enabled();
+        // Of a time in which feedback arrives.
+        bench.babble(100);
+        bench.run(2);
+        (0..6).for_each(|_| bench.lose());
+        bench.babble(frames);
+        if silent {
+            bench.poll();
+            bench.now += SILENCE;
+            bench.poll();
+            assert_eq!(bench.mode(), Mode::Fault, "{frames}: torque off");
+        } else {
+            bench.step();
+            assert_eq!(bench.mode(), Mode::FaultReaction, "{frames}");
+        }
+        assert_eq!(
+            bench.node.controller().cause(),
+            expected,
+            "{frames}, {silent}"
+        );
+    }
 }

@@ -71,9 +71,10 @@ fn enable_is_refused_without_a_peer_of_the_same_schema() {
     let mut bench = Bench::new();
     bench.run(2);
     assert_eq!(bench.request(MotionRequest::Stop), Some(Outcome::Accepted));
+    // Nobody has said anything of a table.
     assert_eq!(
         bench.refusal(MotionRequest::Enable),
-        RefusalReason::SchemaMismatch
+        RefusalReason::WrongState
     );
     bench.hello(table::HASH ^ 1);
     assert_eq!(

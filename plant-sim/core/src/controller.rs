@@ -77,6 +77,11 @@ impl InProcess {
         }
     }
 
+    /// Tells the node that its CAN controller has gone bus-off.
+    pub fn bus_off(&mut self) {
+        self.node.bus_off();
+    }
+
     /// Calls the node at the caller's time `now`; appends the frames that it sends. A node that has to reset is
     /// replaced by a new one.
     pub fn call(&mut self, now: Instant, received: Option<&CanFrame>, sent: &mut Vec<CanFrame>) {
@@ -123,6 +128,11 @@ impl Peer for InProcess {
         out.extend(sent.drain(..).map(|frame| (now + COMPUTE, frame)));
         self.sent = sent;
         world.mind = Mind::of(&self.node);
+        Ok(())
+    }
+
+    fn bus_off(&mut self) -> Result<(), PeerError> {
+        self.node.bus_off();
         Ok(())
     }
 }

@@ -34,6 +34,14 @@ pub trait Peer {
         out: &mut Outbox,
     ) -> Result<(), PeerError>;
 
+    /// Its CAN controller has gone bus-off. Nothing happens to a peer that its CAN controller does not tell.
+    ///
+    /// # Errors
+    /// Those of [`Peer::poll`].
+    fn bus_off(&mut self) -> Result<(), PeerError> {
+        Ok(())
+    }
+
     /// Checks what it has left for later. The run has ended.
     ///
     /// # Errors
@@ -69,6 +77,10 @@ impl<P: Peer + ?Sized> Peer for &mut P {
         (**self).poll(now, received, world, out)
     }
 
+    fn bus_off(&mut self) -> Result<(), PeerError> {
+        (**self).bus_off()
+    }
+
     fn finish(&mut self) -> Result<(), PeerError> {
         (**self).finish()
     }
@@ -88,6 +100,10 @@ impl<P: Peer + ?Sized> Peer for Rc<RefCell<P>> {
         out: &mut Outbox,
     ) -> Result<(), PeerError> {
         self.borrow_mut().poll(now, received, world, out)
+    }
+
+    fn bus_off(&mut self) -> Result<(), PeerError> {
+        self.borrow_mut().bus_off()
     }
 
     fn finish(&mut self) -> Result<(), PeerError> {

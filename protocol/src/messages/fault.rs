@@ -80,6 +80,8 @@ pub enum Unit {
     Millisecond,
     /// Consecutive frames.
     Frame,
+    /// Consecutive samples.
+    Sample,
     /// Bits of a [`DriveStatus`].
     DriveStatus,
     /// Code of a [`KnownAnswer`].
@@ -106,6 +108,7 @@ impl Unit {
             Self::Percent => "%",
             Self::Millisecond => "ms",
             Self::Frame => "frames",
+            Self::Sample => "samples",
         }
     }
 
@@ -122,7 +125,7 @@ impl Unit {
                 write!(f, "{value:.1} {}", self.symbol())
             }
             Self::Percent => write!(f, "{value:.0} %"),
-            Self::Frame => write!(f, "{value:.0} frames in a row"),
+            Self::Frame | Self::Sample => write!(f, "{value:.0} {} in a row", self.symbol()),
             Self::DriveStatus => {
                 f.write_str("drive status")?;
                 let mut bits = value as u8;
@@ -173,7 +176,11 @@ impl Fault {
             (Cause::DuplicateNode, _) => Unit::Identifier,
             (Cause::DriveFault, _) | (Cause::EncoderFault, None) => Unit::DriveStatus,
             (
-                Cause::FeedbackLost | Cause::PeerSilent | Cause::OperatorSilent | Cause::OverTorque,
+                Cause::FeedbackLost
+                | Cause::PeerSilent
+                | Cause::Babbling
+                | Cause::OperatorSilent
+                | Cause::OverTorque,
                 _,
             ) => Unit::Millisecond,
             (Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => Unit::Frame,
@@ -194,15 +201,8 @@ impl Fault {
             (Cause::OverSpeed, None) => Unit::SpeedOfAxis,
             (Cause::OverSpeed, Lift | Tool) => Unit::MetrePerSecond,
             (Cause::OverSpeed, _) => Unit::RadianPerSecond,
-            (
-                Cause::None
-                | Cause::Babbling
-                | Cause::BusOff
-                | Cause::Overrun
-                | Cause::EStop
-                | Cause::SchemaMismatch,
-                _,
-            ) => Unit::None,
+            (Cause::Overrun, _) => Unit::Sample,
+            (Cause::None | Cause::BusOff | Cause::EStop, _) => Unit::None,
         }
     }
 }

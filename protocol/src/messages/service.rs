@@ -207,9 +207,9 @@ codes! {
         DuplicateNode = 6, "duplicate-node";
         /// A position does not change although the axis is off its reference or at its torque limit: encoder or axis is stuck.
         StuckSensor = 7, "stuck-sensor";
-        /// A node floods the bus. Reserved: not raised yet.
+        /// A node floods the bus, so that feedback does not arrive.
         Babbling = 8, "babbling";
-        /// The CAN controller has taken itself off the bus. Reserved: not raised yet.
+        /// The CAN controller has taken itself off the bus after too many errors.
         BusOff = 9, "bus-off";
         /// Values that are not numbers or out of range: in frames that arrived, or as the result of a control law.
         BadValue = 10, "bad-value";
@@ -221,14 +221,12 @@ codes! {
         OverTorque = 13, "over-torque";
         /// An axis has left its range.
         SoftLimit = 14, "soft-limit";
-        /// The control step took longer than a sample several times in a row. Reserved: not raised yet.
+        /// The control step took longer than a sample several times in a row.
         Overrun = 15, "overrun";
         /// The emergency stop was pressed or sent.
         EStop = 16, "estop";
         /// The drives report a fault, that they have switched off by themselves, or that the brake has not closed.
         DriveFault = 17, "drive-fault";
-        /// The peer was built from another message table. Reserved: not raised yet.
-        SchemaMismatch = 18, "schema-mismatch";
         /// An encoder is not valid, jumps further than the axis can move, or moves against its torque, as with a wrong sign.
         EncoderFault = 19, "encoder-fault";
         /// The operator's heartbeat was heard, and has stopped.
@@ -251,7 +249,6 @@ impl Cause {
             Self::Overload => 0x2310,
             Self::DriveFault => 0x5000,
             Self::SelfTest | Self::Overrun => 0x6100,
-            Self::SchemaMismatch => 0x6300,
             Self::StuckSensor | Self::EncoderFault => 0x7300,
             Self::Babbling => 0x8110,
             Self::PeerSilent | Self::OperatorSilent => 0x8130,

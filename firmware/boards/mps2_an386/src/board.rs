@@ -122,6 +122,10 @@ fn serve(
                 settle(node, now, pins, journal);
                 measured
             }
+            Request::BusOff => {
+                node.bus_off();
+                continue;
+            }
             Request::Stack => (stack::used() as u32).into(),
             Request::Plant(fault) => {
                 crate::Image::plant(fault)?;

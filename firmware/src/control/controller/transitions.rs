@@ -64,10 +64,10 @@ impl Controller {
     }
 
     /// Bridges a gap in the feedback if it is short.
-    pub(super) fn bridge(&mut self, steps: u32) {
+    pub(super) fn bridge(&mut self, steps: u32, missing: Cause) {
         if steps > self.max_gap {
             let gap = steps as f32 * self.config.period.seconds() * 1e3;
-            let fault = Fault::value(Cause::FeedbackLost, gap, self.setup.monitor.gap * 1e3);
+            let fault = Fault::value(missing, gap, self.setup.monitor.gap * 1e3);
             self.fail(fault);
         } else if self.state.is_powered() {
             self.limits = self.limits | LimitFlags::PREDICTED;

@@ -145,7 +145,8 @@ impl Judge {
         if self.report.is_some() && !is_latched {
             self.miss(Requirement::Latch);
         }
-        if self.expected == Expected::Survived && !self.survived {
+        let reported = self.report.map(|report| report.1);
+        if !self.expected.allows(self.survived, reported) {
             self.miss(Requirement::NoFalseAlarm);
         }
     }
@@ -177,11 +178,8 @@ impl Judge {
             self.miss(Requirement::Standstill);
         }
         let stopped = self.detected.is_some();
-        let at = match (self.report, self.cut) {
-            (Some((time, _)), Some(cut)) => Some(time.seconds().min(cut)),
-            (Some((time, _)), None) => Some(time.seconds()),
-            (None, cut) => cut,
-        };
+        let reported = self.report.map(|(time, _)| time.seconds());
+        let at = [reported, self.cut].into_iter().flatten().reduce(f64::min);
         Verdict {
             survived: self.survived,
             detected: match self.report {

@@ -230,6 +230,10 @@ impl<P: Peer> Peer for Faulty<P> {
         Ok(())
     }
 
+    fn bus_off(&mut self) -> Result<(), PeerError> {
+        self.peer.bus_off()
+    }
+
     fn finish(&mut self) -> Result<(), PeerError> {
         self.peer.finish()
     }

@@ -1,12 +1,10 @@
 //! Errors on the bus of a rig: who has them, by name, and who is told.
 
-use std::io;
-
 use protocol::messages::Node;
 use protocol::table;
 
-use super::Rig;
-use crate::bus::{Affliction, Delivery, Disturbance, Disturbed, NodeId};
+use super::{Rig, RunError};
+use crate::bus::{Affliction, Delivery, Disturbance, Disturbed, NodeId, Noticed, State};
 use crate::faults::{Impostor, Planned, What};
 use crate::observer::Observer;
 
@@ -61,8 +59,15 @@ impl Rig<'_> {
     }
 
     /// Passes on what CAN controllers have reported; byte 5 of an error frame is the code of the node.
-    pub(super) fn tell<O: Observer>(&mut self, observer: &mut O) -> io::Result<()> {
+    pub(super) fn tell<O: Observer>(&mut self, observer: &mut O) -> Result<(), RunError> {
         for report in self.bus.reports() {
+            if report.what == Noticed::State(State::BusOff) {
+                for seat in &mut self.seats {
+                    if seat.node == report.node {
+                        seat.peer.bus_off()?;
+                    }
+                }
+            }
             let named = self.names.iter().find(|(_, node)| *node == report.node);
             let code = named.map_or(0, |(name, _)| name.code());
             observer.error(report.time, &report.error_frame(code), report.busy)?;

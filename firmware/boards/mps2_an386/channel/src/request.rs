@@ -19,6 +19,8 @@ pub enum Request {
         /// The frame that has arrived, if any.
         frame: Option<CanFrame>,
     },
+    /// The CAN controller has gone bus-off. There is no answer.
+    BusOff,
     /// Report the most stack used so far: an answer without frames, in bytes instead of ticks.
     Stack,
     /// Fail. The only answer is the greeting of the next start.
@@ -65,6 +67,7 @@ const POLL: u8 = 0;
 const POLL_WITH_FRAME: u8 = 1;
 const STACK: u8 = 2;
 const PLANT: u8 = 3;
+const BUS_OFF: u8 = 4;
 
 impl Request {
     /// The record.
@@ -84,6 +87,7 @@ impl Request {
                 put(&mut bytes, 1, &now.nanos().to_le_bytes());
                 put(&mut bytes, 9, &frame_to_bytes(frame));
             }
+            Self::BusOff => put(&mut bytes, 0, &[BUS_OFF]),
             Self::Stack => put(&mut bytes, 0, &[STACK]),
             Self::Plant(fault) => put(&mut bytes, 0, &[PLANT, *fault as u8]),
         }
@@ -103,6 +107,7 @@ impl Request {
                 Some(Self::Poll { now, frame })
             }
             STACK => Some(Self::Stack),
+            BUS_OFF => Some(Self::BusOff),
             PLANT => {
                 let (&fault, _) = rest.split_first()?;
                 let fault = Fault::ALL.get(usize::from(fault))?;
