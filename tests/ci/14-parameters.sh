@@ -36,14 +36,11 @@ holds bandwidth 170.0 || fail "a run does not reset its controller"
 parameters --set following-error-elbow=0.04 --set hold-samples=8 >set.txt
 holds following-error-elbow 0.04 || fail "a limit of the controller is not kept"
 holds hold-samples 8.0 || fail "a value of the drives is not kept"
-# Between two moves the arm is at rest, and gains may be set: to what they are, so that the run stays as good.
-not_now() { ! set_one bandwidth=170 >not_now.txt 2>not_now.err && grep -q "bandwidth cannot be set now; allowed: while the arm is at rest" not_now.err; }
-eventually "a refusal of gains in a move" not_now
 refused "torque-limit-lift cannot be set now; allowed: while the torque is off" set_one torque-limit-lift=0.5
 parameters --server drives >drives.txt
 [ "$(wc -l <drives.txt)" = 10 ] || fail "the drives do not list nine parameters"
 kill -0 $run || fail "the run ended before the requests"
-wait $run || fail "the run did not continue"
+wait $run || fail "the run did not continue: $(cat run.err) $(cat beside.json)"
 grep -q '"completed": true' beside.json && grep -q '"overruns": 0' beside.json && grep -q '"faults": \[\]' beside.json ||
     fail "parameter requests disturbed the run: $(cat beside.json)"
 echo "ok: listed and set during a run of 200 cycles, without an overrun"
@@ -52,6 +49,9 @@ echo "ok: listed and set during a run of 200 cycles, without an overrun"
 timeout 120 "$plant_sim" run --cycles 200 --bus "slcan:tcp:127.0.0.1:$port" --controller external --out tight \
     >tight.txt 2>tight.err & run=$!
 await tight.err "cycle [0-9]* of"
+# Between two moves the arm is at rest, and gains may be set.
+not_now() { ! set_one bandwidth=100 >not_now.txt 2>not_now.err && grep -q "bandwidth cannot be set now; allowed: while the arm is at rest" not_now.err; }
+eventually "a refusal of gains in a move" not_now
 parameters --set speed-factor=0.05 >set.txt
 if wait $run; then fail "the arm continued at twenty times the speed limit"; fi
 await controller.err "fault"

@@ -52,7 +52,7 @@ impl LockStep {
     }
 
     /// Takes the frames that have arrived; those of the controller are compared and passed on.
-    fn take(&mut self) -> Result<(), PeerError> {
+    fn take(&mut self, now: Instant) -> Result<(), PeerError> {
         while let Some(frame) = self.remote.link.receive() {
             match sender(&frame) {
                 Some(Name::Controller) => self.answer(&frame)?,
@@ -60,9 +60,11 @@ impl LockStep {
                     return Err(self.remote.second_plant(&frame));
                 }
                 // Another node has sent a frame, such as an emergency stop or a parameter request, and only the
-                // controller knows when it received it.
+                // controller knows when it received it. The twin receives it as well, so that what is judged by its reference
+                // stays right to a sample.
                 None => {
                     self.follows = false;
+                    self.twin.call(now, Some(&frame));
                     // Of what the controller has yet to send, only the command is sure to come.
                     let due = self.twin.due();
                     due.retain(|frame| table::COMMAND.identifies(frame));
@@ -118,7 +120,7 @@ impl LockStep {
             self.period
         };
         let limit = time::Instant::now() + patience;
-        self.take()?;
+        self.take(now)?;
         while !self.twin.due().is_empty() {
             let left = limit.saturating_duration_since(time::Instant::now());
             if left.is_zero() || self.remote.lost.is_some() {
@@ -136,7 +138,7 @@ impl LockStep {
                 break;
             }
             self.remote.wait(left);
-            self.take()?;
+            self.take(now)?;
         }
         Ok(())
     }
