@@ -62,6 +62,9 @@ fn main() -> ! {
         let ticked = clock.advance();
         if ticked {
             port.set_estop(cabinet.estop_pressed());
+            if port.has_gone_off() {
+                node.bus_off();
+            }
         }
         if ticked || port.has_frames() {
             let before = DWT::cycle_count();
