@@ -62,9 +62,9 @@ pub struct Node {
     /// Message table that the drives were built from, once they have said so.
     schema: Option<u32>,
     overruns: u16,
-    /// Ticks in a row that took too long, and whether the last one did.
+    /// Ticks in a row that took too long, and the number of samples at the last one.
     overruns_in_a_row: u8,
-    has_overrun: bool,
+    overrun: u32,
     worst_tick: u32,
     /// Why the node was started, and whether network management has requested a reset.
     reset: ResetReason,
@@ -96,7 +96,7 @@ impl Node {
             schema: None,
             overruns: 0,
             overruns_in_a_row: 0,
-            has_overrun: false,
+            overrun: 0,
             worst_tick: 0,
             reset,
             reset_asked: false,
@@ -255,9 +255,10 @@ impl Node {
             Some((last, _)) => feedback.sample.wrapping_sub(last).max(1),
         };
         self.newest = Some((feedback.sample, now));
-        let missing = self.why_missing();
+        if steps > 1 {
+            self.blame_gap();
+        }
         self.strangers = 0;
-        self.end_overruns();
         if self.controller.mode() == Mode::PreOperational
             && self.schema == Some(table::HASH)
             && feedback.status.contains(DriveStatus::ENCODER_VALID)
@@ -268,7 +269,6 @@ impl Node {
         let [t1, t2, t3, t4] = feedback.torque.map(f32::from);
         let readings = Readings {
             steps,
-            missing,
             status: feedback.status,
             counts: feedback.position,
             velocity: Vector4::from(feedback.velocity),

@@ -95,7 +95,6 @@ fn monitor() -> Monitor {
 fn readings(velocity: Vector4<f32>, torque: Vector4<f32>) -> Readings {
     Readings {
         steps: 1,
-        missing: Cause::FeedbackLost,
         status: DriveStatus::READY | DriveStatus::TORQUE_ON | DriveStatus::ENCODER_VALID,
         counts: [0; 4],
         velocity,

@@ -16,7 +16,7 @@ use firmware::control::states::{Event, Halt, State, TRANSITIONS};
 use firmware::mechanics::arm::IRB_930;
 use firmware::mechanics::dynamics::drive::Drive;
 use nalgebra::Vector4;
-use protocol::messages::{Cause, Compensation, ControlWord, DriveStatus};
+use protocol::messages::{Compensation, ControlWord, DriveStatus};
 use protocol::time::Period;
 
 #[path = "common/table.rs"]
@@ -198,7 +198,6 @@ fn at_rest() -> Readings {
     let q = Vector4::new(0.2, 1.5, 0.15, 0.3);
     Readings {
         steps: 1,
-        missing: Cause::FeedbackLost,
         status: DriveStatus::READY | DriveStatus::TORQUE_ON | DriveStatus::ENCODER_VALID,
         counts: drive.counts_of_motor_angle(&drive.motor_angle(&q)),
         velocity: Vector4::zeros(),

@@ -105,6 +105,8 @@ pub struct Controller {
     too_fast: u8,
     /// Samples for which moves are still held in it.
     held: u16,
+    /// What a gap in the feedback is put down to.
+    blamed: Cause,
     /// First fault since the last reset.
     fault: Fault,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
@@ -152,6 +154,7 @@ impl Controller {
             operation: Operation::Automatic,
             held: 0,
             too_fast: 0,
+            blamed: Cause::FeedbackLost,
             fault: Fault::NONE,
             alarm: None,
             saturated: 0,
@@ -194,7 +197,7 @@ impl Controller {
         let measured_torque = drive.joint_torque(&readings.torque);
 
         if readings.steps > 1 {
-            self.bridge(readings.steps, readings.missing);
+            self.bridge(readings.steps);
         }
         self.watch(readings, &q, &qd);
         self.wait(readings);

@@ -1,7 +1,7 @@
 //! What the drives report.
 
 use nalgebra::Vector4;
-use protocol::messages::{Cause, DriveStatus};
+use protocol::messages::DriveStatus;
 
 use crate::mechanics::arm::Axis;
 
@@ -13,8 +13,6 @@ const STILL: f32 = 0.5;
 pub struct Readings {
     /// Samples since the last readings: 1, or more where feedback was lost.
     pub steps: u32,
-    /// What is to blame where feedback was lost.
-    pub missing: Cause,
     /// State of the drives.
     pub status: DriveStatus,
     /// Motor encoder counts.

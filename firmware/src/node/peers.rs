@@ -115,12 +115,19 @@ impl Node {
     }
 
     /// Why feedback is missing: somebody else may fill the bus.
-    pub(super) fn why_missing(&self) -> Cause {
+    fn why_missing(&self) -> Cause {
         if self.strangers < FLOOD {
             Cause::FeedbackLost
         } else {
             Cause::Babbling
         }
+    }
+
+    /// Tells the controller why.
+    // Out of line: rare.
+    #[inline(never)]
+    pub(super) fn blame_gap(&mut self) {
+        self.controller.blame_gaps(self.why_missing());
     }
 
     /// Checks the age of the feedback.

@@ -19,19 +19,15 @@ impl Node {
     #[inline(never)]
     pub fn count_overrun(&mut self) {
         self.overruns = self.overruns.saturating_add(1);
-        self.overruns_in_a_row = self.overruns_in_a_row.saturating_add(1);
-        self.has_overrun = true;
+        self.overruns_in_a_row = match self.samples.wrapping_sub(self.overrun) {
+            ..=1 => self.overruns_in_a_row.saturating_add(1),
+            _ => 1,
+        };
+        self.overrun = self.samples;
         if self.overruns_in_a_row >= OVERRUNS {
             let (value, limit) = (self.overruns_in_a_row, OVERRUNS);
             let fault = Fault::value(Cause::Overrun, f32::from(value), f32::from(limit));
             self.controller.fail(fault);
-        }
-    }
-
-    /// A sample after one that was in time ends a row of those that were not.
-    pub(super) fn end_overruns(&mut self) {
-        if !core::mem::take(&mut self.has_overrun) {
-            self.overruns_in_a_row = 0;
         }
     }
 

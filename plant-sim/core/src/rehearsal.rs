@@ -306,7 +306,6 @@ impl Stage {
         let actions = self.controller.step(
             &Readings {
                 steps: 1,
-                missing: Cause::FeedbackLost,
                 status,
                 counts: drive.counts_of_motor_angle(&drive.motor_angle(&q)),
                 velocity: drive.motor_speed(&((q - self.before) / self.period)),
