@@ -71,6 +71,11 @@ impl LockStep {
                 }
             }
         }
+        // The controller hears the same of the interface, and only it knows when.
+        if self.remote.link.take_bus_off() {
+            self.follows = false;
+            self.twin.bus_off();
+        }
         Ok(())
     }
 

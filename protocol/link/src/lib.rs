@@ -114,6 +114,15 @@ impl Link {
         }
     }
 
+    /// Whether the CAN controller of the interface has gone bus-off since the last call, by what has been taken until now. Serial-line
+    /// adapters do not say so.
+    pub fn take_bus_off(&mut self) -> bool {
+        match self {
+            Self::SocketCan(link) => link.take_bus_off(),
+            Self::Slcan(_) | Self::SlcanHub(_) => false,
+        }
+    }
+
     /// Frames that arrived and cannot be taken: the kernel had no room for them, or their lines could not be parsed.
     #[must_use]
     pub fn lost(&self) -> u64 {

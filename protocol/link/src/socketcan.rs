@@ -35,6 +35,8 @@ pub struct SocketCan {
     socket: CanFdSocket,
     interface: String,
     bus_off: bool,
+    /// Whether that has begun since [`Self::take_bus_off`].
+    went_off: bool,
     /// Frames for which the kernel had no room, as its counter of 32 bits has it.
     lost: u32,
     pub(super) failure: Option<LinkError>,
@@ -69,6 +71,7 @@ impl SocketCan {
             socket,
             interface: name(),
             bus_off: false,
+            went_off: false,
             lost: 0,
             failure: None,
         })
@@ -85,6 +88,10 @@ impl SocketCan {
                 .map_err(|error| failed(error.into()))?;
         }
         Ok(link)
+    }
+
+    pub(super) fn take_bus_off(&mut self) -> bool {
+        std::mem::take(&mut self.went_off)
     }
 
     /// Frames for which the kernel had no room.
@@ -121,6 +128,7 @@ impl SocketCan {
             };
             if let Event::Error { class, .. } = event {
                 self.bus_off |= class & CAN_ERR_BUSOFF != 0;
+                self.went_off |= class & CAN_ERR_BUSOFF != 0;
                 self.bus_off &= class & CAN_ERR_RESTARTED == 0;
             }
             return Some(Arrival {

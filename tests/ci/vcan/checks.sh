@@ -61,6 +61,16 @@ controller
 wait $plant || fail "run after the controller came back"
 passed "controller killed: reported, summary written; plant first, controller later: completed"
 
+# --- the interface reports bus-off, and its recovery, in the middle of a move
+mark
+plant --cycles 1000 --out off >off.txt 2>off.err & plant=$!
+await_controller "moving"
+cansend vcan0 20000140#0000000000000000
+await_controller "bus off"
+wait $plant && fail "a run with a bus-off was completed"
+grep -q '"cause": "bus-off"' off/summary.json || fail "bus-off: $(cat off.txt)"
+passed "a bus-off that the interface reports stops the arm"
+
 # --- the plant dies in mid-run and comes back
 mark
 "$bin/plant-sim" run --cycles 1000 --bus socketcan:vcan0 --controller external --out dead >dead.txt 2>dead.err & plant=$!

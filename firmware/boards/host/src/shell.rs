@@ -94,6 +94,10 @@ impl Shell {
             while let Some(stamped) = self.link.take() {
                 self.take(&stamped);
             }
+            if self.link.take_bus_off() {
+                self.node.bus_off();
+                self.poll(None);
+            }
             if self.clock.idle() {
                 self.poll(None);
             }
