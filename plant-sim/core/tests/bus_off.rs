@@ -141,6 +141,9 @@ fn a_burst_of_errors_stops_the_arm_and_a_reset_lets_it_go_on() {
                 "{fault}: {off} {back}"
             );
             assert!(!seen.causes.is_empty(), "{fault}");
+            if node == Node::Controller {
+                assert_eq!(seen.causes[0], Cause::BusOff, "{fault}");
+            }
             assert!(seen.speed() < 1e-3, "{fault} {}", seen.speed());
             goes_on(&mut run, &mut seen);
         }
