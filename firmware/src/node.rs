@@ -23,7 +23,7 @@ use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use crate::control::controller::{Config, Controller};
-use crate::control::fault::PEER_TIMEOUT_MS;
+use crate::control::fault::{FLOOD, PEER_TIMEOUT_MS};
 use crate::control::phase::{Phase, Probe};
 use crate::control::readings::Readings;
 use crate::control::self_test;
@@ -255,8 +255,10 @@ impl Node {
             Some((last, _)) => feedback.sample.wrapping_sub(last).max(1),
         };
         self.newest = Some((feedback.sample, now));
-        if steps > 1 {
-            self.blame_gap();
+        // By themselves they change nothing.
+        let is_felt = steps > 1 || !feedback.status.contains(DriveStatus::TORQUE_ON);
+        if self.strangers >= FLOOD && is_felt {
+            self.blame_flood();
         }
         self.strangers = 0;
         if self.controller.mode() == Mode::PreOperational

@@ -21,7 +21,7 @@ mod table;
 const ORACLE: &str = "
 self-test       at once      nothing        nothing        nothing        restart
 feedback-lost   5 ms         stop           brake          nothing        reset
-babbling        5 ms         stop           brake          nothing        reset
+babbling        32 frames    stop           brake          nothing        reset
 bus-off         at once      stop           brake          nothing        reset
 overrun         5 samples    stop           brake          nothing        reset
 peer-silent     100 ms       off            off            off            reset
@@ -76,7 +76,9 @@ fn seen_by(cause: Cause) -> &'static str {
     match cause {
         Cause::SelfTest => "known answers of mathematics, kinematics and CRC; ranges of the model",
         Cause::FeedbackLost => "sample number of the next feedback",
-        Cause::Babbling => "as before, with more than 15 frames meanwhile that are no message",
+        Cause::Babbling => {
+            "frames that are no message, with no feedback in between; felt where feedback is lost or late, or the drives have let go"
+        }
         Cause::BusOff => "CAN controller",
         Cause::Overrun => "time of a sample",
         Cause::PeerSilent => {

@@ -105,8 +105,6 @@ pub struct Controller {
     too_fast: u8,
     /// Samples for which moves are still held in it.
     held: u16,
-    /// What a gap in the feedback is put down to.
-    blamed: Cause,
     /// First fault since the last reset.
     fault: Fault,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
@@ -154,7 +152,6 @@ impl Controller {
             operation: Operation::Automatic,
             held: 0,
             too_fast: 0,
-            blamed: Cause::FeedbackLost,
             fault: Fault::NONE,
             alarm: None,
             saturated: 0,

@@ -31,7 +31,10 @@ pub const HEARTBEAT_TIMEOUT_MS: u32 = milliseconds(Parameter::HeartbeatTimeout);
 pub const SATURATION_MS: u32 = milliseconds(Parameter::SaturationTime);
 /// Consecutive rejected, stale or repeated feedback frames that stop the arm: two can be noise, and even at 500 Hz
 /// three last no longer than an allowed gap.
-pub const BAD_FRAMES: u8 = Parameter::BadFrames.initial(1.0) as u8;
+pub const BAD_FRAMES: u16 = Parameter::BadFrames.initial(1.0) as u16;
+/// Frames in a row that are no message, with no feedback in between, that stop the arm: of eight bytes, they fill a bus of 1 Mbit/s for as long as the
+/// drives hold a command at 1 kHz. At half the load of a bus, that many of other devices arrive in 8 ms.
+pub const FLOOD: u16 = 32;
 /// Ticks in a row that take too long, and stop the arm: as many as samples for which the drives hold a command. A computer without a real-time
 /// system is late now and then.
 pub const OVERRUNS: u8 = 5;
@@ -55,7 +58,7 @@ pub enum Limit {
     /// Longer than this, ms.
     Milliseconds(u32),
     /// This many frames in a row.
-    Frames(u8),
+    Frames(u16),
     /// This many samples in a row.
     Samples(u8),
     /// More than this share, %.
@@ -134,12 +137,7 @@ pub static REACTIONS: [Row; 22] = {
             [Stop, Brake, None],
             Reset,
         ),
-        row(
-            Cause::Babbling,
-            Milliseconds(MAX_GAP_MS),
-            [Stop, Brake, None],
-            Reset,
-        ),
+        row(Cause::Babbling, Frames(FLOOD), [Stop, Brake, None], Reset),
         row(Cause::BusOff, AtOnce, [Stop, Brake, None], Reset),
         row(
             Cause::Overrun,

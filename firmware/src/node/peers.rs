@@ -9,10 +9,7 @@ use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use super::Node;
-
-/// Frames without a feedback among them that are no message of the bench: a node floods the bus. Every message of the bench fits in
-/// between more than once, and a frame that is repeated because of an error is received once.
-const FLOOD: u16 = 16;
+use crate::control::fault::FLOOD;
 
 /// The heartbeat of another node. As CiA 301 has it, it is watched from the first one on that was heard.
 #[derive(Clone, Debug)]
@@ -114,20 +111,13 @@ impl Node {
         }
     }
 
-    /// Why feedback is missing: somebody else may fill the bus.
-    fn why_missing(&self) -> Cause {
-        if self.strangers < FLOOD {
-            Cause::FeedbackLost
-        } else {
-            Cause::Babbling
-        }
-    }
-
-    /// Tells the controller why.
+    /// Somebody fills the bus. What of the feedback has got through may be late, and whether commands do is for the drives to say.
     // Out of line: rare.
     #[inline(never)]
-    pub(super) fn blame_gap(&mut self) {
-        self.controller.blame_gaps(self.why_missing());
+    pub(super) fn blame_flood(&mut self) {
+        let (frames, limit) = (f32::from(self.strangers), f32::from(FLOOD));
+        self.controller
+            .fail(Fault::value(Cause::Babbling, frames, limit));
     }
 
     /// Checks the age of the feedback.
@@ -140,9 +130,8 @@ impl Node {
         if age > Duration::from_micros(u64::from((timeout * 1e6) as u32)) {
             let age_ms = age.nanos() as f32 * 1e-6;
             // First what is to blame. Without feedback there is no stop, so the silence follows in any case.
-            if self.why_missing() == Cause::Babbling {
-                let fault = Fault::value(Cause::Babbling, age_ms, timeout * 1e3);
-                self.controller.fail(fault);
+            if self.strangers >= FLOOD {
+                self.blame_flood();
             }
             self.controller
                 .fail(Fault::value(Cause::PeerSilent, age_ms, timeout * 1e3));

@@ -151,8 +151,8 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.step()
         }
         Cause::Babbling => {
-            (0..6).for_each(|_| bench.lose());
-            bench.babble(16);
+            bench.lose();
+            bench.babble(40);
             bench.step()
         }
         Cause::BusOff => {
@@ -279,7 +279,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
         let expected = match cause {
             Cause::SelfTest => format!("self test: {}", KnownAnswer::Model),
             Cause::FeedbackLost => "feedback lost: 7.0 ms, limit 5.0 ms".into(),
-            Cause::Babbling => "babbling: 7.0 ms, limit 5.0 ms".into(),
+            Cause::Babbling => "babbling: 40 frames in a row, limit 32 frames in a row".into(),
             Cause::BusOff => "bus off".into(),
             Cause::Overrun => "overrun: 5 samples in a row, limit 5 samples in a row".into(),
             Cause::PeerSilent => "peer silent: 100.0 ms, limit 100.0 ms".into(),

@@ -240,35 +240,42 @@ fn drives_that_switch_off_before_they_are_told_to_are_a_fault() {
     assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
 }
 
-/// A gap in which the bus is full of frames that are no message is somebody's who sends them; one in which an operator asks for much
-/// is not.
+/// Where feedback is lost, the drives have let go, or nothing is heard any more; frames that nobody feels are bad input.
 #[test]
-fn a_gap_is_told_from_a_flooded_bus() {
-    for (frames, silent, expected) in [
-        (15, false, Cause::FeedbackLost),
-        (16, false, Cause::Babbling),
-        (15, true, Cause::PeerSilent),
-        (16, true, Cause::Babbling),
+fn a_flooded_bus_is_named_where_it_is_felt() {
+    for (lost, off, silent, otherwise) in [
+        (0, false, false, Cause::None),
+        (1, false, false, Cause::None),
+        (6, false, false, Cause::FeedbackLost),
+        (0, true, false, Cause::DriveFault),
+        (0, false, true, Cause::PeerSilent),
     ] {
-        let mut bench = Bench::enabled();
-        // Of a time in which feedback arrives.
-        bench.babble(100);
-        bench.run(2);
-        (0..6).for_each(|_| bench.lose());
-        bench.babble(frames);
-        if silent {
+        for frames in [31, 32] {
+            let mut bench = Bench::enabled();
+            for _ in 0..10 {
+                bench.babble(31);
+                bench.step();
+            }
+            (0..lost).for_each(|_| bench.lose());
+            bench.babble(frames);
             bench.poll();
-            bench.now += SILENCE;
-            bench.poll();
-            assert_eq!(bench.mode(), Mode::Fault, "{frames}: torque off");
-        } else {
-            bench.step();
-            assert_eq!(bench.mode(), Mode::FaultReaction, "{frames}");
+            bench.obeys = !off;
+            if silent {
+                bench.now += SILENCE;
+                bench.poll();
+            } else {
+                bench.step();
+            }
+            let is_felt = frames > 31 && (lost, off, silent) != (0, false, false);
+            let expected = if is_felt { Cause::Babbling } else { otherwise };
+            let what = (lost, off, silent, frames);
+            assert_eq!(bench.node.controller().cause(), expected, "{what:?}");
+            let mode = match (expected, silent) {
+                (Cause::None, _) => Mode::Enabled,
+                (_, true) => Mode::Fault,
+                _ => Mode::FaultReaction,
+            };
+            assert_eq!(bench.mode(), mode, "{what:?}");
         }
-        assert_eq!(
-            bench.node.controller().cause(),
-            expected,
-            "{frames}, {silent}"
-        );
     }
 }

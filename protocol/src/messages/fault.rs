@@ -176,14 +176,12 @@ impl Fault {
             (Cause::DuplicateNode, _) => Unit::Identifier,
             (Cause::DriveFault, _) | (Cause::EncoderFault, None) => Unit::DriveStatus,
             (
-                Cause::FeedbackLost
-                | Cause::PeerSilent
-                | Cause::Babbling
-                | Cause::OperatorSilent
-                | Cause::OverTorque,
+                Cause::FeedbackLost | Cause::PeerSilent | Cause::OperatorSilent | Cause::OverTorque,
                 _,
             ) => Unit::Millisecond,
-            (Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => Unit::Frame,
+            (Cause::Babbling | Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => {
+                Unit::Frame
+            }
             (Cause::FollowingError | Cause::SoftLimit | Cause::StuckSensor, None) => {
                 Unit::RadianOrMetre
             }

@@ -63,18 +63,13 @@ impl Controller {
         self.state = next;
     }
 
-    /// Says what gaps in the feedback are to be put down to from now on.
-    pub fn blame_gaps(&mut self, on: Cause) {
-        self.blamed = on;
-    }
-
     /// Bridges a gap in the feedback if it is short.
     // Out of line: rare.
     #[inline(never)]
     pub(super) fn bridge(&mut self, steps: u32) {
         if steps > self.max_gap {
             let gap = steps as f32 * self.config.period.seconds() * 1e3;
-            let fault = Fault::value(self.blamed, gap, self.setup.monitor.gap * 1e3);
+            let fault = Fault::value(Cause::FeedbackLost, gap, self.setup.monitor.gap * 1e3);
             self.fail(fault);
         } else if self.state.is_powered() {
             self.limits = self.limits | LimitFlags::PREDICTED;
