@@ -53,7 +53,7 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, SetupError> {
     let (mut done, mut begun, mut from) = (0, 0, stage.pose());
     let mut repeated = 0;
     let mut refused: Vec<Refused> = Vec::new();
-    for Task { action, spot } in Program::new(scenario) {
+    for Task { action, spot } in Program::new(&config.asked()) {
         match action {
             Action::Cell(CellEvent::BeginCycle) => (begun, from) = (stage.samples, stage.pose()),
             Action::Cell(CellEvent::EndCycle) => {
