@@ -1,5 +1,6 @@
 //! Checks of a scenario before anything runs: ranges, and that the gripper can do what it has to.
 
+mod operation;
 mod requirements;
 
 use std::f64::consts::TAU;
@@ -92,18 +93,11 @@ impl Scenario {
                     findings.held(held.take());
                 }
                 Step::Stop(_) | Step::Estop(_) => held = None,
-                Step::Release(Release { after, .. }) if self.operation.is_automatic() => {
-                    findings.wrong(
-                        &format!("{key}.release.after"),
-                        after,
-                        "with operation = \"manual\", in which moves are held",
-                    );
-                }
-                Step::Release(_) => {}
-                Step::Jump(_) | Step::Line(_) | Step::Joints(_) => {}
+                Step::Release(_) | Step::Jump(_) | Step::Line(_) | Step::Joints(_) => {}
             }
         }
         findings.held(held);
+        findings.operation();
         findings.requirements();
         findings.judge()
     }
