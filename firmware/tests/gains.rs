@@ -9,6 +9,9 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "common/draws.rs"]
+mod draws;
+
 use firmware::control::laws::{Gains, Selection};
 use firmware::mechanics::arm::{Axis, IRB_930};
 use nalgebra::{SMatrix, SVector};
@@ -95,7 +98,7 @@ fn compensations() -> impl Strategy<Value = Compensation> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(3000))]
+    #![proptest_config(draws::cases(3000))]
 
     /// What is accepted is stable, and unless it is hardly damped stays so when the joint has two thirds of the model's inertia or
     /// one and a half times as much.

@@ -19,7 +19,7 @@ use proptest::prelude::*;
 use protocol::messages::{ElbowSide, Posture, RefusalReason, WristTurn};
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(500))]
+    #![proptest_config(common::draws::cases(500))]
 
     /// A jump ends at its pose, with the elbow at the side and the wrist in the turn that were asked for, or names the axis
     /// that cannot.

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use protocol::parameters::ControllerParameter as Parameter;
 
+use crate::maths::{exp, square};
 use crate::model::RobotModel;
 
 /// Time constant, s: the controller's, unless it has been set to another.
@@ -43,11 +44,12 @@ impl Heat {
         // Of each motor by itself.
         let mut own = *tau;
         own[3] -= self.coupling * tau[2];
-        let kept = (-(t - last) / time_constant()).exp();
-        for axis in 0..4 {
-            let share = own[axis] / self.continuous[axis];
-            self.shares[axis] = share * share + (self.shares[axis] - share * share) * kept;
-            self.greatest[axis] = self.greatest[axis].max(self.shares[axis]);
+        let kept = exp(-(t - last) / time_constant());
+        for (axis, effort) in own.into_iter().enumerate() {
+            let wanted = square(effort / self.continuous[axis]);
+            let share = wanted + (self.shares[axis] - wanted) * kept;
+            self.shares[axis] = share;
+            self.greatest[axis] = self.greatest[axis].max(share);
         }
     }
 

@@ -7,6 +7,7 @@ use firmware::mechanics::kinematics::Trig;
 use firmware::trajectory::Reference;
 use nalgebra::Vector4;
 
+use crate::maths::ln;
 use crate::metrics::time_constant;
 use crate::model::AXES;
 
@@ -83,7 +84,7 @@ impl Cycle {
         let (axis, heat) = greatest(&self.for_ever(1.0));
         let warm = first_below_full();
         let cycle_s = (self.moving + self.resting) * period;
-        let after = time_constant() * -(1.0 - warm / heat).ln();
+        let after = time_constant() * -ln(1.0 - warm / heat);
         let lasts = cycle_s * f64::from(cycles);
         if heat <= warm || after >= lasts {
             return None;
@@ -99,7 +100,7 @@ impl Cycle {
         let limit = f64::from(OVERLOAD_PERCENT) * 0.01;
         if hottest > limit {
             // At the latest: as if it had been so slow from the beginning.
-            let stops = time_constant() * -(1.0 - limit / hottest).ln();
+            let stops = time_constant() * -ln(1.0 - limit / hottest);
             text += &format!(
                 ", and even at {at:.2} of their speed the {axis} gets to {:.0} %: at {:.0} % the controller stops the arm for overload, within about {stops:.0} s; \
                  a lighter load or longer pauses without torque are needed",
@@ -124,13 +125,12 @@ impl Cycle {
 
     /// Samples of rest that keep every motor below `warm`, if any do.
     fn pause(&self, warm: f64) -> Option<f64> {
-        let all = self.for_ever(1.0);
         let samples = self.moving + self.resting;
         let mut longest = 0.0f64;
-        for axis in 0..4 {
+        for (heat, holding) in self.for_ever(1.0).into_iter().zip(self.holding) {
             // While it rests, it only holds.
-            let rest = self.holding[axis] / self.resting.max(1.0);
-            let missing = samples * (all[axis] - warm);
+            let rest = holding / self.resting.max(1.0);
+            let missing = samples * (heat - warm);
             if missing > 0.0 {
                 if rest >= warm {
                     return None;
