@@ -9,7 +9,11 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "common/draws.rs"]
+mod draws;
+
 use firmware::control::laws::{Gains, Selection};
+use firmware::mechanics::arm::{Axis, IRB_930};
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 use protocol::messages::{Compensation, Law, RefusalReason};
@@ -94,7 +98,7 @@ fn compensations() -> impl Strategy<Value = Compensation> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(3000))]
+    #![proptest_config(draws::cases(3000))]
 
     /// What is accepted is stable, and unless it is hardly damped stays so when the joint has two thirds of the model's inertia or
     /// one and a half times as much.
@@ -189,4 +193,43 @@ fn an_integral_faster_than_its_loop_is_refused() {
         law(Compensation::Observer, gains).check(1e-3, 249.6e-6),
         Ok(())
     );
+}
+
+/// A count of the shoulder's encoder in torque, by hand for the stretched arm with 22 kg: 38.92 kg m², of which the payload has 24.26, the
+/// second arm 8.88 and the rotor 2.46.
+#[test]
+fn coarse_encoders_lower_the_gains() {
+    let period = 5e-4;
+    let usual = Gains::for_period(period);
+    assert_eq!(Gains::for_arm(&IRB_930, period), usual);
+    let share = |counts: f64| {
+        let count = std::f64::consts::TAU / counts / 80.0;
+        38.92 * (2.0 * 190.0 + 190.0) * count / 5e-4 / 640.0
+    };
+    let (axis, found) = usual.encoder_step(&IRB_930, period);
+    assert_eq!(axis, Axis::Shoulder);
+    assert!((f64::from(found) / share(131_072.0) - 1.0).abs() < 1e-3);
+    let with = |counts| {
+        let mut arm = IRB_930;
+        arm.drive.encoder_counts = counts;
+        Gains::for_arm(&arm, period)
+    };
+    // 4.15 % with 131,072 counts: a tenth of the limit with 54,450.
+    assert_eq!(with(54_600), usual);
+    for counts in [54_300, 20_000, 10_000, 4096, 1000] {
+        let gains = with(counts);
+        let wanted = 190.0 * 0.1 / share(f64::from(counts));
+        for gain in [gains.bandwidth, gains.observer] {
+            assert!(
+                (f64::from(gain) / wanted - 1.0).abs() < 1e-3,
+                "{counts}: {gain} {wanted}"
+            );
+        }
+        assert_eq!(gains.damping, usual.damping);
+        // As slow as they are, every law takes them.
+        let integral = law(Compensation::Integral, gains);
+        assert_eq!(integral.check(period, 249.6e-6), Ok(()));
+    }
+    // None is lowered below its range.
+    assert_eq!(with(16).bandwidth, 1.0);
 }

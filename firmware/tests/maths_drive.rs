@@ -46,7 +46,7 @@ fn matrix(train: &DriveTrain) -> Matrix4<f64> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(512))]
+    #![proptest_config(common::draws::cases(512))]
 
     #[test]
     fn motor_side_follows_the_coupling_matrix(train in train(), q in position(), torque in torque()) {

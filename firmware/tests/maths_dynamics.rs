@@ -54,7 +54,7 @@ fn assert_matrix_close(
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(512))]
+    #![proptest_config(common::draws::cases(512))]
 
     /// The inertia that laws and planner use, as a matrix or not, is links plus rotors.
     #[test]

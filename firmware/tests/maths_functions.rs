@@ -146,7 +146,7 @@ fn clamp_has_no_panic() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(4096))]
+    #![proptest_config(common::draws::cases(4096))]
 
     /// Beyond the reduction range the phase may be off by half the spacing of the argument, 2^-24 of it, at most.
     #[test]

@@ -58,7 +58,7 @@ fn task_velocity() -> impl Strategy<Value = Vector4<f32>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(512))]
+    #![proptest_config(common::draws::cases(512))]
 
     #[test]
     fn jacobian_is_the_derivative_of_the_pose(arm in arm(), q in position()) {

@@ -52,7 +52,7 @@ fn turn_between(a: f32, b: f32) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1024))]
+    #![proptest_config(common::draws::cases(1024))]
 
     /// Any posture within the limits has a pose, and that pose has a joint position for either elbow that leads back to it.
     ///

@@ -34,7 +34,7 @@ const GATE_B: Pose = Pose {
 };
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(500))]
+    #![proptest_config(common::draws::cases(500))]
 
     #[test]
     fn joint_moves_keep_every_limit(arm in robot(), from in joints(), to in joints(), mass in 0.0f32..22.0, speed in 0.05f32..1.0) {
@@ -330,7 +330,7 @@ fn refusals_name_axis_value_and_limit() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(500))]
+    #![proptest_config(common::draws::cases(500))]
 
     /// Of lines anywhere, many of which graze the inner limit of the elbow or turn the shoulder back: between the points that
     /// planning looks at, too, no joint leaves its range by more than rounding; shoulder and wrist, whose turning points are not

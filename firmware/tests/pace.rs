@@ -166,7 +166,7 @@ fn changes() -> impl Strategy<Value = Vec<(f32, f32)>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(500))]
+    #![proptest_config(common::draws::cases(500))]
 
     #[test]
     fn joint_moves_keep_limits_and_path_at_any_pace(
@@ -356,7 +356,7 @@ fn ride(from: &Vector4<f32>, to: &Vector4<f32>, ride: &Ride) -> Result<(), TestC
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(500))]
+    #![proptest_config(common::draws::cases(500))]
 
     #[test]
     fn one_move_goes_over_into_the_next(from in joints(), to in joints(), course in rides()) {

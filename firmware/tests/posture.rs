@@ -19,7 +19,7 @@ use proptest::prelude::*;
 use protocol::messages::{ElbowSide, Posture, RefusalReason, WristTurn};
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(500))]
+    #![proptest_config(common::draws::cases(500))]
 
     /// A jump ends at its pose, with the elbow at the side and the wrist in the turn that were asked for, or names the axis
     /// that cannot.
@@ -102,4 +102,41 @@ fn a_line_ends_in_the_turn_asked_for_and_at_its_side() {
     assert!(far.value > far.limit, "{far:?}");
     let other = line(ElbowSide::Negative, WristTurn::Nearest).unwrap_err();
     assert_eq!(other.reason, RefusalReason::ElbowSide);
+}
+
+/// Moves whose torques change fastest between the borders of their segments: at a peak speed that turns the elbow through the stretched arm, and
+/// in strokes so short that they change their force several times while the wrist takes up its own. Before they were looked at
+/// there, these three passed the rate by 0.4 to 2 %.
+#[test]
+fn torque_rates_between_borders_are_kept() {
+    for (from, end) in [
+        (
+            [0.4664529, -2.2225091, 0.17990395, 4.4134064],
+            [0.5312266, 0.90191555, 0.27769244, -0.71128273],
+        ),
+        (
+            [-2.2925217, 2.0504267, 0.00032690616, 5.7743545],
+            [-2.5171986, 1.2967885, 0.15372084, -0.63689804],
+        ),
+        (
+            [-0.7755766, 1.6953921, 0.0019828747, -2.3723087],
+            [-1.0818981, 1.6049602, 0.20464115, 4.7225637],
+        ),
+    ] {
+        let (from, end): (Vector4<f32>, Vector4<f32>) = (from.into(), end.into());
+        let pose = kinematics::forward(&IRB_930.geometry, &end);
+        let start = kinematics::forward(&IRB_930.geometry, &from);
+        let turn = (end.w / std::f32::consts::TAU).round() as i8;
+        let target = Target::Jump {
+            pose,
+            posture: Posture {
+                elbow: ElbowSide::Positive,
+                turn: WristTurn::of_number(turn).unwrap(),
+            },
+            top: start.z.max(pose.z),
+            clearance: 0.0,
+        };
+        let trajectory = plan(&IRB_930, &two_kg(), &from, target, 1.0).unwrap();
+        check(&IRB_930, &two_kg(), &trajectory).unwrap();
+    }
 }

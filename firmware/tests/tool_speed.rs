@@ -71,7 +71,7 @@ fn posed(arm: &ArmModel, radius: f32, angle: f32, z: f32) -> Option<(Pose, Vecto
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(common::draws::cases(200))]
 
     #[test]
     fn no_point_is_fast_on_a_move_in_joint_space(arm in robot(), from in joints(), to in joints(), speed in 0.05f32..1.0) {

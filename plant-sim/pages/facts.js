@@ -19,6 +19,7 @@ function facts({ results }) {
         ["Tracking error, RMS and peak", `${digits(results.tracking_error_mm.rms)} mm, ${digits(results.tracking_error_mm.max)} mm`],
         ["Peak torque over limit", share(results.torque_utilisation)],
         ["RMS torque over continuous rating", share(results.thermal_utilisation)],
+        ["Warmest motor, over what it may have for ever", `${results.heat.warmest} ${(100 * results.heat.greatest).toFixed(0)} %${results.heat.slowed_from_s === null ? "" : `, moves slowed down from ${digits(results.heat.slowed_from_s)} s on`}`],
         ["Peak speed over limit", share(results.speed_utilisation)],
         ["Bus", `${(100 * results.bus_load).toFixed(1)} % load, ${results.frames} frames, ${results.frames_lost} lost, ${results.overruns} commands late${results.bus_errors ? `, ${results.bus_errors} errors` : ""}`],
         ["Simulated time", `${digits(results.sim_time_s)} s`],

@@ -68,9 +68,9 @@ impl Config {
     /// Bench settings for `arm`: computed torque with observer, sampled every `period`, on a bus of the default bit timing.
     pub fn new(arm: ArmModel, period: Period) -> Self {
         Self {
-            arm,
             period,
-            setup: Setup::new(period.seconds()),
+            setup: Setup::new(&arm, period.seconds()),
+            arm,
         }
     }
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::laws::{Gains, Selection};
 use crate::control::monitor::MonitorLimits;
-use crate::mechanics::arm::Payload;
+use crate::mechanics::arm::{ArmModel, Payload};
 
 /// What can be changed while the controller runs. Plain fields, each written between two samples.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,14 +36,15 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Defaults of the parameter table for a sampling period (s): no payload, computed torque with observer.
-    pub fn new(period: f32) -> Self {
+    /// Defaults of the parameter table for a sampling period (s), with gains that the encoders of `arm` bear: no payload, computed torque
+    /// with observer.
+    pub fn new(arm: &ArmModel, period: f32) -> Self {
         Self {
             payload: Payload::NONE,
             selection: Selection {
                 law: Law::ComputedTorqueJoint,
                 compensation: Compensation::Observer,
-                gains: Gains::for_period(period),
+                gains: Gains::for_arm(arm, period),
             },
             command_delay: const { Parameter::CommandDelay.initial(1.0) },
             brake_delay: const { Parameter::BrakeDelay.initial(1.0) },

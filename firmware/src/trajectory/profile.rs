@@ -150,18 +150,29 @@ impl SCurve {
         }
     }
 
+    /// Whether the acceleration is being taken up from rest at `t`, s, or lowered to it.
+    pub fn is_next_to_rest(&self, t: f32) -> bool {
+        t < self.accelerate.ramp || t > self.duration() - self.brake.ramp
+    }
+
     /// First segment border after `t`, s; infinite from the end on. Jerk changes at a border, so the extrema of a move
-    /// are often there.
+    /// are often there. The ramps next to the peak speed count as three segments each: at that speed the inertia changes within them, and
+    /// with it the torque's rate of change.
     #[inline(never)]
     pub fn border_after(&self, t: f32) -> f32 {
         let (there, back) = (&self.accelerate, &self.brake);
+        let third = 1.0 / 3.0;
         let mut border = 0.0;
         for segment in [
             there.ramp,
             there.hold,
-            there.fall,
+            third * there.fall,
+            third * there.fall,
+            third * there.fall,
             self.cruise,
-            back.fall,
+            third * back.fall,
+            third * back.fall,
+            third * back.fall,
             back.hold,
             back.ramp,
         ] {

@@ -1,6 +1,7 @@
 //! Shared by the tests of mathematics and motion: random arms and positions, units of error, and plans.
 #![allow(dead_code)] // Each test binary uses its own part.
 
+pub(crate) mod draws;
 pub(crate) mod magnitude;
 pub(crate) mod planned;
 

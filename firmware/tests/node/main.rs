@@ -22,5 +22,7 @@ mod stops;
 mod switching;
 mod wire;
 
+#[path = "../common/draws.rs"]
+mod draws;
 #[path = "../common/table.rs"]
 mod table;

@@ -380,7 +380,7 @@ fn request() -> impl Strategy<Value = ParameterRequest> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(crate::draws::cases(64))]
 
     /// Whatever is set, every value stays in range, and the node answers each feedback with finite torques.
     #[test]

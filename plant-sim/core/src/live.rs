@@ -66,7 +66,7 @@ impl<'p> Live<'p> {
             faults,
             seed,
         )));
-        let desk = Desk::new(&config.scenario);
+        let desk = Desk::new(&config.asked());
         let desk = Rc::new(RefCell::new(Faulty::new(
             desk,
             Node::Operator,

@@ -13,6 +13,7 @@
 //! The target is the requested one in double precision; the controller gets it rounded.
 
 mod cycle;
+mod heat;
 mod offset;
 
 use schemars::JsonSchema;
@@ -20,6 +21,8 @@ use serde::Serialize;
 
 use cycle::Cycle;
 pub use cycle::CycleResult;
+pub use heat::Heat;
+pub(crate) use heat::time_constant;
 pub use offset::Offset;
 
 use crate::model::RobotModel;

@@ -35,6 +35,7 @@ pub(crate) fn sentence(request: &MotionRequest, refusal: &Refusal) -> String {
             );
         }
     }
+    text += readiness(request, refusal);
     if let Some(z) = height(request, refusal) {
         // The flange goes down as the lift goes up its axis.
         text += &format!(
@@ -49,6 +50,21 @@ pub(crate) fn sentence(request: &MotionRequest, refusal: &Refusal) -> String {
         text += &asked(posture);
     }
     text
+}
+
+/// What a request to switch on or go on lacked, whose reason alone tells too little: an operator greets before it asks, and the controller
+/// forgets that when the drives fall silent.
+fn readiness(request: &MotionRequest, refusal: &Refusal) -> &'static str {
+    match (request, refusal.reason) {
+        (_, RefusalReason::SchemaMismatch) => {
+            ", or the controller has forgotten the operator's hello because the drives were silent: they, or the bus between, were cut off"
+        }
+        (MotionRequest::Enable, RefusalReason::WrongState) => {
+            "; it takes ready, to which the controller comes by itself once it hears the drives and the operator's hello; from fault it takes a \
+             fault-reset before"
+        }
+        _ => "",
+    }
 }
 
 /// A number without the digits that single precision does not have.
@@ -157,6 +173,20 @@ mod tests {
             limit,
         };
         sentence(&request, &refusal)
+    }
+
+    /// A bus that was held before the arm was switched on is not told as a program of another source alone.
+    #[test]
+    fn a_refusal_to_switch_on_names_silent_drives() {
+        for reason in [RefusalReason::SchemaMismatch, RefusalReason::WrongState] {
+            let text = sentence(&MotionRequest::Enable, &Refusal::because(reason));
+            assert!(text.contains("drives") && text.contains("hello"), "{text}");
+        }
+        let stop = sentence(
+            &MotionRequest::Stop,
+            &Refusal::because(RefusalReason::WrongState),
+        );
+        assert_eq!(stop, "The present state does not allow it");
     }
 
     #[test]

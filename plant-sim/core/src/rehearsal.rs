@@ -5,6 +5,7 @@
 //! its model needs for the planned motion. Whether law, gains and rate can follow the plan is tried in a cycle on the robot that
 //! the controller believes in.
 
+mod heat;
 mod plan;
 mod trial;
 
@@ -26,6 +27,7 @@ use protocol::time::Duration;
 pub use plan::{Move, Plan, Refused};
 
 use crate::operator::program::{Action, Program, Task};
+use crate::scenario::Ending;
 use crate::setup::{RunConfig, SetupError};
 use crate::world::{CellEvent, OperatorError, Spot};
 
@@ -53,9 +55,12 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, SetupError> {
     let (mut done, mut begun, mut from) = (0, 0, stage.pose());
     let mut repeated = 0;
     let mut refused: Vec<Refused> = Vec::new();
-    for Task { action, spot } in Program::new(scenario) {
+    for Task { action, spot } in Program::new(&config.asked()) {
         match action {
-            Action::Cell(CellEvent::BeginCycle) => (begun, from) = (stage.samples, stage.pose()),
+            Action::Cell(CellEvent::BeginCycle) => {
+                (begun, from) = (stage.samples, stage.pose());
+                stage.cycle = heat::Cycle::default();
+            }
             Action::Cell(CellEvent::EndCycle) => {
                 done += 1;
                 if !refused.is_empty() {
@@ -79,8 +84,21 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, SetupError> {
             },
         }
     }
+    let mut warnings = config.warnings();
     if refused.is_empty() {
         refused.extend(trial::failure(config));
+        match stage
+            .cycle
+            .foresee(scenario.cycles, f64::from(stage.period))
+        {
+            Some(Ok(warning)) => warnings.push(warning),
+            Some(Err(reason)) if scenario.ends == Ending::Completed => refused.push(Refused {
+                cycle: None,
+                step: None,
+                reason,
+            }),
+            _ => {}
+        }
     }
     Ok(Plan {
         scenario: scenario.name.clone(),
@@ -90,7 +108,8 @@ pub fn rehearse(config: &RunConfig) -> Result<Plan, SetupError> {
         torque_utilisation: stage.torque,
         speed_utilisation: stage.speed,
         moves: stage.moves,
-        warnings: config.warnings(),
+        heat: stage.cycle.for_ever(1.0),
+        warnings,
         refused,
     })
 }
@@ -118,6 +137,8 @@ struct Stage {
     under_way: VecDeque<(u8, usize)>,
     torque: [f64; 4],
     speed: [f64; 4],
+    /// What the motors give in the last cycle.
+    cycle: heat::Cycle,
 }
 
 impl Stage {
@@ -143,6 +164,7 @@ impl Stage {
             under_way: VecDeque::new(),
             torque: [0.0; 4],
             speed: [0.0; 4],
+            cycle: heat::Cycle::default(),
         };
         stage.sample_at(start);
         stage
@@ -324,6 +346,8 @@ impl Stage {
     /// What the reference of this sample needs.
     fn measure(&mut self) {
         let reference = *self.controller.reference();
+        let continuous = &self.arm.limits.effort_continuous;
+        self.cycle.add(&self.body, continuous, &reference);
         let effort = self
             .body
             .inverse(&Trig::new(&reference.q), &reference.qd, &reference.qdd);

@@ -84,7 +84,7 @@ pub(crate) fn assemble<'p, C: Peer + 'p>(
     }
     let drives = Faulty::new(drives, Node::Drives, faults, *seed);
     rig.attach_as(Node::Drives, drives);
-    let operator = Operator::new(&config.scenario);
+    let operator = Operator::new(&config.asked());
     let operator = Faulty::new(operator, Node::Operator, faults, *seed);
     rig.attach_as(Node::Operator, operator);
     let controller = Faulty::new(controller, Node::Controller, faults, *seed);

@@ -8,6 +8,7 @@ mod operation;
 mod requirement;
 mod step;
 
+use firmware::control::laws::Gains;
 use protocol::messages::WristTurn;
 use protocol::parameters::ControllerParameter as Parameter;
 use schemars::JsonSchema;
@@ -126,17 +127,39 @@ pub struct GainsSpec {
 }
 
 impl GainsSpec {
-    /// Key, parameter and value of each gain, for samples every `period` seconds.
-    pub(crate) fn each(&self, period: f32) -> [(&'static str, Parameter, f64); 3] {
+    /// Key, parameter and value of each gain; those left out are the controller's `own`.
+    pub(crate) fn each(&self, own: &Gains) -> [(&'static str, Parameter, f64); 3] {
         [
-            ("gains.bandwidth", Parameter::Bandwidth, self.bandwidth),
-            ("gains.damping", Parameter::Damping, self.damping),
-            ("gains.observer", Parameter::Observer, self.observer),
+            (
+                "gains.bandwidth",
+                Parameter::Bandwidth,
+                self.bandwidth,
+                own.bandwidth,
+            ),
+            (
+                "gains.damping",
+                Parameter::Damping,
+                self.damping,
+                own.damping,
+            ),
+            (
+                "gains.observer",
+                Parameter::Observer,
+                self.observer,
+                own.observer,
+            ),
         ]
-        .map(|(key, parameter, value)| {
-            let own = || f64::from(parameter.initial(period));
-            (key, parameter, value.unwrap_or_else(own))
-        })
+        .map(|(key, parameter, value, own)| (key, parameter, value.unwrap_or(f64::from(own))))
+    }
+
+    /// All of them.
+    pub(crate) fn complete(&self, own: &Gains) -> Self {
+        let [bandwidth, damping, observer] = self.each(own).map(|(_, _, value)| Some(value));
+        Self {
+            bandwidth,
+            damping,
+            observer,
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Checked setup of a run: from a scenario and two robots to a rig.
 
+mod encoder;
+
 use firmware::mechanics::arm::{self, ArmModel};
 use nalgebra::Vector4;
 use protocol::time::Period;
@@ -77,6 +79,30 @@ pub enum SetupError {
         /// Step that it needs, us.
         step_us: f64,
     },
+    /// Gains that the encoders bear do not hold the arm.
+    #[error(
+        "model {robot}: drive.encoder_counts_per_motor_rev is {counts}, too coarse at {rate_hz} Hz: a count would be {percent:.0} % of the \
+         torque limit of the {axis}, and a loop that bears that has a bandwidth of {bandwidth:.1} rad/s, which hardly holds the arm; \
+         allowed: {least} counts or more{slower}, or give gains.bandwidth and gains.observer"
+    )]
+    Coarse {
+        /// Robot.
+        robot: String,
+        /// Counts per turn of the motor.
+        counts: u32,
+        /// Control rate.
+        rate_hz: f64,
+        /// Share of the torque limit with the usual gains, %.
+        percent: f64,
+        /// Of this axis.
+        axis: &'static str,
+        /// Bandwidth that is left, rad/s.
+        bandwidth: f64,
+        /// Least number of counts.
+        least: f64,
+        /// Rate at which these suffice, if there is one.
+        slower: String,
+    },
     /// The bus cannot carry the messages at this rate.
     #[error("at {rate_hz} Hz the {source}; lower the rate")]
     Link {
@@ -116,7 +142,11 @@ impl RunConfig {
         let mut wrong = Vec::new();
         wrong.extend(
             scenario
-                .check_with(&self.nominal, rig::command_delay(&timing))
+                .check_with(
+                    &self.nominal,
+                    &self.own_gains(),
+                    rig::command_delay(&timing),
+                )
                 .err()
                 .map(SetupError::from),
         );
@@ -131,6 +161,7 @@ impl RunConfig {
                 step_us: step as f64 * 1e-3,
             });
         }
+        wrong.extend(self.too_coarse());
         let load = rig::admit(&timing, scenario.rate_hz);
         wrong.extend(load.err().map(|source| SetupError::Link {
             rate_hz: scenario.rate_hz,
@@ -181,6 +212,7 @@ impl RunConfig {
                 self.nominal.name
             ));
         }
+        warnings.extend(self.coarse());
         warnings
     }
 

@@ -2,6 +2,7 @@
 
 mod injected;
 mod recipe;
+mod warmth;
 
 use std::io;
 
@@ -19,6 +20,8 @@ use trace::ErrorFrame;
 pub use injected::Injected;
 use injected::Windows;
 pub use recipe::{GainsInForce, Model, Models, Recipe};
+use warmth::Thermometer;
+pub use warmth::Warmth;
 
 use crate::metrics::{CycleResult, MeanMax, Metrics, RmsMax, Spread};
 use crate::observer::{Observer, Truth};
@@ -74,10 +77,12 @@ pub struct Summary {
     pub torque_utilisation: [f64; 4],
     /// Root-mean-square effort over the continuous limit, by axis, of 1.
     pub thermal_utilisation: [f64; 4],
+    /// How warm the motors got.
+    pub heat: Warmth,
     /// Peak speed over its limit, by axis, of 1.
     pub speed_utilisation: [f64; 4],
-    /// Least share of the planned speed at which the controller reported to move, of 1: less than 1 with a speed override, and
-    /// where the torque did not suffice.
+    /// Least share of the planned speed at which the controller reported to move, of 1: less than 1 with a speed override, where
+    /// the torque did not suffice, and with warm motors.
     pub pace: f64,
     /// Longest time with the motor at its limit, by axis, according to the plant, s.
     pub longest_saturation_s: [f64; 4],
@@ -147,6 +152,7 @@ pub struct Collector {
     metrics: Metrics,
     judge: Judge,
     windows: Windows,
+    thermometer: Thermometer,
     faults: Vec<Fault>,
     /// The last state.
     state: Option<State>,
@@ -168,6 +174,7 @@ impl Collector {
             metrics: Metrics::new(&config.actual),
             judge: Judge::new(config),
             windows: Windows::new(&config.scenario),
+            thermometer: Thermometer::new(&config.actual),
             faults: Vec::new(),
             state: None,
             pace: 1.0,
@@ -190,6 +197,7 @@ impl Collector {
             metrics,
             judge,
             windows,
+            thermometer,
             faults,
             state,
             pace,
@@ -237,6 +245,7 @@ impl Collector {
             },
             torque_utilisation: metrics.torque_utilisation(),
             thermal_utilisation: metrics.thermal_utilisation(),
+            heat: thermometer.finish(),
             speed_utilisation: metrics.speed_utilisation(),
             pace,
             longest_saturation_s: metrics
@@ -299,6 +308,7 @@ impl Observer for Collector {
             // The state with the rest of the fault follows at once, unless an earlier state is still on the bus.
             Message::State(state) => {
                 self.state = Some(state);
+                self.thermometer.state(time, &state);
                 if state.mode == Mode::Moving {
                     self.pace = self.pace.min(f64::from(state.pace) / 100.0);
                 }
@@ -333,6 +343,7 @@ impl Observer for Collector {
     }
 
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
+        self.thermometer.sample(truth);
         let tracking = self.metrics.tracked(truth);
         let late = self
             .answered

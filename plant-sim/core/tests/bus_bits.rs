@@ -9,6 +9,9 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "../../../firmware/tests/common/draws.rs"]
+mod draws;
+
 use proptest::prelude::*;
 use protocol::frame::{CanFrame, ExtendedId, FrameKind, Id, StandardId};
 use protocol::wire::{BitTiming, FrameBits, TimingError};
@@ -206,7 +209,7 @@ fn crcs_of_the_second_derivation_have_the_published_check_values() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(4096))]
+    #![proptest_config(draws::cases(4096))]
 
     #[test]
     fn exact_length_is_that_of_the_frame_built_bit_by_bit(frame in any_frame()) {

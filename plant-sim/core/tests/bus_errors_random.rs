@@ -90,8 +90,6 @@ fn play((sends, errors, seed): &Run, eager: bool) -> Outcome {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(256))]
-
     /// Whatever goes wrong, once it is over every frame has arrived, at least once at every node that did not misread it.
     #[test]
     fn frames_arrive_in_the_end(run in any_run()) {

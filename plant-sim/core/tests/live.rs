@@ -8,6 +8,8 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "../../../firmware/tests/common/draws.rs"]
+mod draws;
 #[path = "common/live.rs"]
 mod live;
 
@@ -324,7 +326,7 @@ fn orders() -> impl Strategy<Value = Order> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(draws::cases(24))]
 
     /// Whatever is asked for and whenever, every order has an answer.
     #[test]

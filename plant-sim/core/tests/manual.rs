@@ -16,11 +16,11 @@ use std::fmt::Write;
 
 use oorandom::Rand64;
 use protocol::codec;
-use protocol::messages::{Cause, Message, Mode, MotionRequest, Operation};
+use protocol::messages::{Cause, Law, Message, Mode, MotionRequest, Operation};
 use record::{Record, run_of};
 use sim::observer::PlantState;
 use sim::plant::kinematics::wrap;
-use sim::scenario::Scenario;
+use sim::scenario::{OperationName, Scenario};
 
 /// m/s of ISO 10218-1, at every point within so many m of the axis of the flange.
 const LIMIT: f64 = 0.25;
@@ -184,6 +184,36 @@ fn a_silent_operator_lets_go_first() {
         before.iter().all(|it| !it.plant.is_moving()),
         "it stood by then"
     );
+}
+
+/// Laws without a model of the arm do not keep the tool as slow as it is planned: they are refused before anything runs, with what would do.
+#[test]
+fn a_law_that_overshoots_is_refused_in_manual_operation() {
+    let text = "[[cycle]]\njump = { to = [0.7, -0.1, -0.27, 0.0], top = -0.25 }\n";
+    for law in Law::ALL {
+        let mut text = scenario(1000, 22.0, text).to_toml();
+        text = text.replace("computed-torque:observer", law.name());
+        let manual = Scenario::parse(&text, "a test");
+        // Whatever the law, nothing is wrong with it where no tool has to be slow.
+        let mut automatic =
+            Scenario::parse(&text.replace("operation = \"manual\"", ""), "a test").unwrap();
+        if law.takes_compensation() {
+            assert!(manual.is_ok(), "{law}");
+            continue;
+        }
+        let error = manual.unwrap_err().to_string();
+        for word in ["law is", law.name(), "computed-torque", "250 mm/s"] {
+            assert!(error.contains(word), "{law}: {error}");
+        }
+        // A run is the oracle for the worst of them: asked to be manual behind the check's back it is stopped.
+        automatic.operation = OperationName::Manual;
+        automatic.rate_hz = 250.0;
+        let (summary, _) = run_of(automatic, &[], 0);
+        if *law == Law::Pid {
+            let fault = summary.fault.unwrap();
+            assert!(fault.contains("over speed, tool"), "{fault}");
+        }
+    }
 }
 
 /// A scenario lets go only where moves are held.

@@ -8,9 +8,18 @@
     reason = "a test fails by panicking"
 )]
 
+use std::io;
+
+use oorandom::Rand64;
+use protocol::codec;
+use protocol::frame::CanFrame;
+use protocol::messages::{Message, MotionRequest};
+use protocol::time::Instant;
+use sim::model::RobotModel;
+use sim::observer::Observer;
 use sim::rehearsal::rehearse;
 use sim::run::in_process;
-use sim::scenario::Scenario;
+use sim::scenario::{GainsSpec, PayloadSpec, Scenario};
 use sim::setup::RunConfig;
 use sim::summary::Summary;
 
@@ -61,4 +70,147 @@ fn a_rise_time_below_two_samples_is_warned_of() {
         *cycle = run(&config).cycle_time_s.unwrap().mean;
     }
     assert!(cycles[1] > cycles[0], "{cycles:?}");
+}
+
+/// The gate with the robot's encoders replaced by others.
+fn with_counts(robot: RobotModel, counts: u32, rate_hz: f64) -> RunConfig {
+    let mut config = RunConfig::new(Scenario::built_in("gate").unwrap());
+    config.scenario.cycles = 2;
+    config.scenario.rate_hz = rate_hz;
+    config.scenario.requirements.clear();
+    config.nominal = robot;
+    config.nominal.drive.encoder_counts = counts;
+    config.actual = config.nominal.clone();
+    config
+}
+
+/// Whatever the encoders are, the controller's own gains do what a run needs, or are refused; they are warned of if they are other than those
+/// of a fine encoder.
+#[test]
+fn coarse_encoders_are_warned_of_and_stop_no_run() {
+    let mut random = Rand64::new(20);
+    let (mut warned, mut refused) = (0, 0);
+    for case in 0..40 {
+        let robot = [RobotModel::irb_930_22_105(), RobotModel::irb_930_12_085()][case % 2].clone();
+        let rate_hz = [250.0, 500.0, 1000.0, 2000.0, 2400.0][case % 5];
+        let counts = 2.0f64.powf(8.0 + 9.0 * random.rand_float()) as u32;
+        let heaviest = robot.payload_max;
+        let mut config = with_counts(robot, counts, rate_hz);
+        config.scenario.mismatch.friction = 0.7 + 0.6 * random.rand_float();
+        let mass = heaviest * random.rand_float();
+        config.scenario.payload = Some(PayloadSpec::compact(mass));
+        let what = format!("{counts} counts at {rate_hz} Hz, {mass} kg");
+        match config.rig() {
+            Ok(_) => {}
+            Err(error) => {
+                let error = error.to_string();
+                for word in [
+                    "encoder_counts_per_motor_rev",
+                    "torque limit of the",
+                    "allowed: ",
+                ] {
+                    assert!(error.contains(word), "{what}: {error}");
+                }
+                refused += 1;
+                continue;
+            }
+        }
+        let fine = run(&with_counts(config.nominal.clone(), 131_072, rate_hz));
+        let coarse = run(&config);
+        assert!(coarse.faults.is_empty(), "{what}: {:?}", coarse.error);
+        assert!(coarse.completed, "{what}");
+        let warnings = config.warnings();
+        let is_lower = coarse.recipe.gains != fine.recipe.gains;
+        assert_eq!(
+            warnings.len(),
+            usize::from(is_lower),
+            "{what}: {warnings:?}"
+        );
+        warned += u32::from(is_lower);
+    }
+    assert!(warned > 10 && refused > 3, "{warned} {refused}");
+}
+
+/// Gains of a scenario that the encoders do not bear: the run shows it, and with those that the warning names it does not.
+#[test]
+fn gains_too_high_for_the_encoders_are_named() {
+    for (counts, rate_hz) in [(4096, 2000.0), (2000, 1000.0), (1024, 2000.0)] {
+        let mut config = with_counts(RobotModel::irb_930_22_105(), counts, rate_hz);
+        config.scenario.gains = Some(GainsSpec {
+            bandwidth: Some(160.0),
+            damping: None,
+            observer: Some(160.0),
+        });
+        let what = format!("{counts} counts at {rate_hz} Hz");
+        let summary = run(&config);
+        assert!(summary.stopped, "{what}: it does not stop");
+        let [warning] = config.warnings().try_into().unwrap();
+        let refused = rehearse(&config).unwrap().refused;
+        let reason = &refused[0].reason;
+        for text in [&warning, reason] {
+            assert!(
+                text.contains(&format!("encoder_counts_per_motor_rev is {counts}")),
+                "{text}"
+            );
+            assert!(
+                text.contains("shoulder") && !text.contains("higher rate"),
+                "{text}"
+            );
+        }
+        let (_, said) = reason.split_once("lower gains.bandwidth to ").unwrap();
+        let (bandwidth, said) = said.split_once(" and gains.observer to ").unwrap();
+        let (observer, _) = said.split_once(',').unwrap();
+        config.scenario.gains = Some(GainsSpec {
+            bandwidth: Some(bandwidth.parse().unwrap()),
+            damping: None,
+            observer: Some(observer.parse().unwrap()),
+        });
+        assert_eq!(config.warnings(), [""; 0], "{what}");
+        assert_eq!(rehearse(&config).unwrap().refused, [], "{what}");
+        let summary = run(&config);
+        assert!(
+            summary.completed && summary.faults.is_empty(),
+            "{what}: {:?}",
+            summary.error
+        );
+    }
+}
+
+/// A gain that a scenario leaves out is the one that the controller has with its encoders.
+#[test]
+fn a_gain_left_out_is_that_of_the_encoders() {
+    let mut config = with_counts(RobotModel::irb_930_22_105(), 10_000, 2000.0);
+    let own = run(&config).recipe.gains;
+    assert!((30.0..40.0).contains(&own.observer), "{own:?}");
+    config.scenario.gains = Some(GainsSpec {
+        bandwidth: Some(20.0),
+        ..GainsSpec::default()
+    });
+    let mut asked = Asked::default();
+    let summary = in_process(&config, &mut asked).unwrap();
+    assert_eq!(summary.recipe.gains.observer, own.observer);
+    assert_eq!(
+        asked.0.map(|gains| gains.map(f64::from)),
+        Some([20.0, 1.0, own.observer])
+    );
+}
+
+/// The gains that the operator asked for on the bus.
+#[derive(Default)]
+struct Asked(Option<[f32; 3]>);
+
+impl Observer for Asked {
+    fn frame(&mut self, _: Instant, frame: &CanFrame) -> io::Result<()> {
+        if let Ok(received) = codec::decode(frame)
+            && let Message::Motion(motion) = received.message
+            && let MotionRequest::SetGains {
+                bandwidth,
+                damping,
+                observer,
+            } = motion.request
+        {
+            self.0 = Some([bandwidth, damping, observer]);
+        }
+        Ok(())
+    }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use clap::Args;
+use plant_sim::say;
 use sim::rehearsal::{Plan, rehearse};
 
 use super::run::{ConfigArgs, ScenarioArgs};
@@ -24,6 +25,10 @@ pub(super) struct CheckArgs {
 pub(super) fn run(args: &CheckArgs) -> Result<(), Failure> {
     let config = args.config.config(args.scenario.name())?;
     let plan = rehearse(&config).map_err(Failure::usage)?;
+    let said = config.warnings();
+    for warning in plan.warnings.iter().filter(|it| !said.contains(it)) {
+        say!("plant-sim: warning: {warning}");
+    }
     if args.json {
         let json = serde_json::to_string_pretty(&plan).map_err(|error| error.to_string())?;
         show(&(json + "\n"))?;
@@ -83,9 +88,10 @@ fn text(plan: &Plan) -> String {
     let cycles = if plan.cycles == 1 { "cycle" } else { "cycles" };
     let _ = writeln!(
         text,
-        "  torque, peak                          {}\n  speed, peak                           {}",
+        "  torque, peak                          {}\n  speed, peak                           {}\n  heat, if it went on for ever          {}",
         percent(&plan.torque_utilisation),
         percent(&plan.speed_utilisation),
+        percent(&plan.heat),
     );
     let _ = writeln!(
         text,

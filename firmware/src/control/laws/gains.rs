@@ -12,11 +12,26 @@
 //! margin). Then the loop gain can about double before the loop becomes unstable, with or without the observer, whose
 //! own lead makes up for its integral action: a load lighter than announced, or an axis whose inertia in the present
 //! pose is half the nominal one, is still stable. The test `gains` compares with powers of the sampled loop's matrix.
+//!
+//! Encoders are another bound. A position is known to a count, and so a mean velocity over a sample to a count per period, which the
+//! derivative part and the observer turn into torque: with an inertia J the step
+//!
+//! ```text
+//! J (2 zeta w + observer) count / period
+//! ```
+//!
+//! up and down, from sample to sample. What it takes of the torque limit is lost to moves, which need that limit, and beyond some
+//! tenths the loop does nothing but chatter. So the defaults are lowered until it is [`Gains::ENCODER_STEP`] at the most, for the arm stretched
+//! with the heaviest payload; of a finer encoder nothing is to be seen.
 
+use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 use protocol::parameters::ControllerParameter as Parameter;
 use serde::{Deserialize, Serialize};
 
+use crate::mechanics::arm::{ArmModel, Axis, Payload};
+use crate::mechanics::body::Body;
+use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::{atan2, sqrt};
 
 /// Closed-loop gains, the same three numbers for every law and every robot: they yield accelerations, and inertia turns
@@ -32,6 +47,10 @@ pub struct Gains {
 }
 
 impl Gains {
+    /// Share of an axis' torque limit that a count of its encoder may make with the default gains. The plan leaves as much as half of that
+    /// of each limit, and a step is half above the mean and half below.
+    pub const ENCODER_STEP: f32 = 0.1;
+
     /// Defaults of the parameter table, for an arm as stiff as the model says, reduced where the delay of sampling
     /// every `period` seconds requires it.
     pub fn for_period(period: f32) -> Self {
@@ -40,6 +59,46 @@ impl Gains {
             damping: Parameter::Damping.initial(period),
             observer: Parameter::Observer.initial(period),
         }
+    }
+
+    /// The same for `arm`: with bandwidth and observer lowered where its encoders are too coarse for them.
+    // Out of line: once.
+    #[inline(never)]
+    pub fn for_arm(arm: &ArmModel, period: f32) -> Self {
+        let mut gains = Self::for_period(period);
+        let (_, step) = gains.encoder_step(arm, period);
+        if step > Self::ENCODER_STEP {
+            let lower = |gain: &mut f32, least: f32| {
+                *gain = (*gain * (Self::ENCODER_STEP / step)).max(least)
+            };
+            lower(&mut gains.bandwidth, Parameter::Bandwidth.rule().lower);
+            lower(&mut gains.observer, Parameter::Observer.rule().lower);
+        }
+        gains
+    }
+
+    /// The axis on which a count of the encoder makes the greatest step of the torque, as a share of its limit, and that share. For
+    /// the stretched arm with the heaviest payload.
+    pub fn encoder_step(&self, arm: &ArmModel, period: f32) -> (Axis, f32) {
+        let heaviest = Payload {
+            mass: arm.payload_max,
+            ..Payload::NONE
+        };
+        let body = Body::new(arm, &heaviest);
+        let inertia = body.mass_matrix(&Trig::new(&Vector4::zeros())).diagonal();
+        let count = body.drive.motor_angle_of_counts(&[1; 4]);
+        // What each axis gets from its own motor, which turns as much more as it gives less.
+        let step = count.component_div(&body.drive.own_torque(&Vector4::repeat(1.0)));
+        let torque = inertia.component_mul(&step) * ((self.derivative() + self.observer) / period);
+        let shares = torque.component_div(&body.torque_limit.fixed_rows::<4>(0));
+        let mut greatest = (Axis::Shoulder, 0.0);
+        for axis in Axis::ALL {
+            let share = axis.of(&shares);
+            if share > greatest.1 {
+                greatest = (axis, share);
+            }
+        }
+        greatest
     }
 
     /// Refuses gains outside their ranges, and those whose loop, sampled every `period` seconds and acting `command_delay`

@@ -9,7 +9,7 @@ use crate::mechanics::math::least;
 use crate::trajectory::path::Path;
 use crate::trajectory::request::from_path;
 use crate::trajectory::torque_budget::TorqueBudget;
-use crate::trajectory::{Reference, Trajectory};
+use crate::trajectory::{Lift, Reference, Trajectory};
 
 /// Most steps of the last pass between the borders of the travel's segments; more along a line, where the joints have extrema of
 /// their own.
@@ -121,6 +121,7 @@ impl Planner {
             path,
             start,
             profile,
+            lift,
             span,
             ..
         } = &self.draft;
@@ -137,6 +138,19 @@ impl Planner {
         let soon = t + 0.05 * step;
         let mut next = least(t + step, *span);
         next = least(next, start + profile.border_after(soon - start));
+        // A stroke shorter than that changes the torques of the wrist's motor several times while the travel takes up its own.
+        if let Some(lift) = lift
+            && profile.is_next_to_rest(soon - start)
+        {
+            let Lift {
+                up,
+                down,
+                down_start,
+                ..
+            } = lift;
+            next = least(next, up.border_after(soon));
+            next = least(next, down_start + down.border_after(soon - down_start));
+        }
         // Nor may the last one follow at once: a rate over no time is rounding.
         if span - next < 0.05 * step {
             next = *span;

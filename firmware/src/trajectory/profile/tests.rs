@@ -126,24 +126,27 @@ proptest! {
     }
 }
 
-/// The jerk is constant between borders and changes at each. All eight are found, and no other.
+/// The jerk is constant between borders, and changes at each but those within the ramps next to the peak speed. All are found, and no other.
 #[test]
 fn borders_are_where_the_jerk_changes() {
     let bounds = even(2.0, 20.0, 30.0, 1e3);
     let curve = SCurve::new(1.0, &bounds);
     let mut t = -0.1;
-    let borders = [(); 8].map(|()| {
+    let borders = [(); 12].map(|()| {
         let border = curve.border_after(t);
         t = border + 1e-6;
         border
     });
     assert_eq!(curve.border_after(t), f32::INFINITY);
     assert_eq!(borders[0], 0.0);
-    assert!((borders[7] / curve.duration() - 1.0).abs() < 1e-6);
-    for (segment, jerk) in borders
-        .windows(2)
-        .zip([1e3, 0.0, -1e3, 0.0, -1e3, 0.0, 1e3])
-    {
+    assert!((borders[11] / curve.duration() - 1.0).abs() < 1e-6);
+    let jerks = [1e3, 0.0, -1e3, -1e3, -1e3, 0.0, -1e3, -1e3, -1e3, 0.0, 1e3];
+    for ramp in [&borders[2..6], &borders[6..10]] {
+        let third = (ramp[3] - ramp[0]) / 3.0;
+        let mut parts = ramp.windows(2).map(|part| part[1] - part[0]);
+        assert!(parts.all(|part| (part / third - 1.0).abs() < 1e-4));
+    }
+    for (segment, jerk) in borders.windows(2).zip(jerks) {
         let length = segment[1] - segment[0];
         for share in [0.01, 0.4, 0.7] {
             let t = segment[0] + share * length;

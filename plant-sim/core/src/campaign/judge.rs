@@ -314,9 +314,8 @@ impl Judge {
     fn judge_fall(&mut self) {
         // An arm that went on moved as it was meant to.
         let went_on = self.report.is_none() && self.missed.contains(&Requirement::Latch);
-        // A spring pulls it back to where it caught the tool.
-        let pulled = self.faults.catch_the_tool();
-        if !went_on && !pulled && self.lift.drop() > self.bounds.drop(self.lift.speed()) {
+        let allowed = self.bounds.drop(self.lift.speed()) + self.lift.pull();
+        if !went_on && self.lift.drop() > allowed {
             self.miss(Requirement::Drop);
         }
         let is_controlled = self.cut.is_none()
@@ -371,6 +370,7 @@ impl Observer for Judge {
         {
             self.miss(Requirement::Detected);
         }
+        self.lift.catch(plant, now >= self.faults.caught_from());
         if now >= self.onset && self.rest.is_none() {
             self.measure(plant, truth.mind.q[2]);
         }

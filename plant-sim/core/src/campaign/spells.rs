@@ -87,6 +87,13 @@ impl Spells {
         self.any(|what| matches!(what, What::Load(LoadDefect::Caught(_))))
     }
 
+    /// From when on it does; the end of time if never.
+    pub(super) fn caught_from(&self) -> Instant {
+        let caught = |spell: &&Spell| matches!(spell.what, What::Load(LoadDefect::Caught(_)));
+        let begins = self.all.iter().filter(caught).map(|spell| spell.from);
+        begins.min().unwrap_or(Instant::MAX)
+    }
+
     /// Whether something may move an arm without torque: a spring, or the weight of a lift that nothing holds.
     pub(super) fn move_the_arm(&self) -> bool {
         let opens = |what| matches!(what, What::Brake(BrakeDefect::StuckOpen));

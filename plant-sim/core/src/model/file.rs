@@ -234,7 +234,8 @@ pub struct Drive {
     /// Speed over which Coulomb friction builds up as tanh(qd / eps), rad/s and m/s.
     #[schemars(transform = by(ANY_POSITIVE))]
     pub coulomb_tanh_eps: [f64; 4],
-    /// Whole counts per turn of the motor. The range of every axis, twice, has to fit into 32 bits.
+    /// Whole counts per turn of the motor. The range of every axis, twice, has to fit into 32 bits. With few, the
+    /// controller lowers its gains, or a run is refused.
     #[schemars(range(min = FEWEST_COUNTS, max = i32::MAX))]
     pub encoder_counts_per_motor_rev: u32,
 }

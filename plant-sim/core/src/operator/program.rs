@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use firmware::control::laws::Gains;
 use protocol::messages::{Mode, MotionRequest};
 use protocol::time::Duration;
 
@@ -132,7 +133,7 @@ impl Program {
         }
         if let Some(gains) = &scenario.gains {
             let [bandwidth, damping, observer] = gains
-                .each((1.0 / scenario.rate_hz) as f32)
+                .each(&Gains::for_period((1.0 / scenario.rate_hz) as f32))
                 .map(|(_, _, value)| value as f32);
             actions.push(Action::Request(MotionRequest::SetGains {
                 bandwidth,

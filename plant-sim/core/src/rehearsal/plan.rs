@@ -22,6 +22,9 @@ pub struct Plan {
     pub torque_utilisation: [f64; 4],
     /// Greatest speed over its limit, by joint.
     pub speed_utilisation: [f64; 4],
+    /// Heat of each motor if the cycle went on for ever as planned, by joint: mean square of the effort over the continuous limit, of 1. Above 0.9
+    /// the controller slows moves down.
+    pub heat: [f64; 4],
     /// What can be run, and will not go as well as one may think.
     pub warnings: Vec<String>,
     /// What keeps it from running; empty where nothing does. With anything here, the numbers are those of what could be planned.

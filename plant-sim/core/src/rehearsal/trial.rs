@@ -25,12 +25,14 @@ pub(super) fn failure(config: &RunConfig) -> Option<Refused> {
     };
     // Another robot may not reach the start of this one.
     let error = in_process(&trial, &mut ()).ok()?.error?;
+    let advice = config.encoder_advice().unwrap_or_else(|| {
+        "a lower speed, a higher rate_hz or another law or gains may help".into()
+    });
     Some(Refused {
         cycle: None,
         step: None,
         reason: format!(
-            "{error}, in a trial of its first cycle under {law} at {rate_hz} Hz; a lower speed, a higher rate_hz or another law \
-             or gains may help"
+            "{error}, in a trial of its first cycle under {law} at {rate_hz} Hz; {advice}"
         ),
     })
 }

@@ -1,5 +1,6 @@
 //! Checks of a scenario before anything runs: ranges, and that the gripper can do what it has to.
 
+mod operation;
 mod requirements;
 
 use std::f64::consts::TAU;
@@ -92,18 +93,11 @@ impl Scenario {
                     findings.held(held.take());
                 }
                 Step::Stop(_) | Step::Estop(_) => held = None,
-                Step::Release(Release { after, .. }) if self.operation.is_automatic() => {
-                    findings.wrong(
-                        &format!("{key}.release.after"),
-                        after,
-                        "with operation = \"manual\", in which moves are held",
-                    );
-                }
-                Step::Release(_) => {}
-                Step::Jump(_) | Step::Line(_) | Step::Joints(_) => {}
+                Step::Release(_) | Step::Jump(_) | Step::Line(_) | Step::Joints(_) => {}
             }
         }
         findings.held(held);
+        findings.operation();
         findings.requirements();
         findings.judge()
     }
@@ -116,11 +110,12 @@ impl Scenario {
     pub fn check_with(
         &self,
         robot: &RobotModel,
+        own_gains: &Gains,
         command_delay: Duration,
     ) -> Result<(), ScenarioError> {
         let mut findings = Findings::of(self);
         if let Some(gains) = &self.gains {
-            findings.gains(gains, command_delay.seconds() as f32);
+            findings.gains(gains, own_gains, command_delay.seconds() as f32);
         }
         findings.gripper(Allowed::within(0.0, robot.payload_max, "kg"));
         findings.windows();
@@ -202,10 +197,10 @@ impl<'a> Findings<'a> {
     }
 
     /// Checks each gain by itself, then all of them as the loop of the law.
-    fn gains(&mut self, gains: &GainsSpec, command_delay: f32) {
+    fn gains(&mut self, gains: &GainsSpec, own: &Gains, command_delay: f32) {
         let (rate, law) = (self.scenario.rate_hz, self.scenario.law);
         let period = (1.0 / rate) as f32;
-        let each = gains.each(period);
+        let each = gains.each(own);
         let known = self.wrong.len();
         for (key, parameter, value) in each {
             let rule = parameter.rule();

@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use trace::LogHash;
 
 use crate::model::RobotModel;
-use crate::scenario::{Ending, Mismatch, PayloadSpec, Scenario};
+use crate::scenario::{Ending, Mismatch, PayloadSpec};
 use crate::setup::RunConfig;
 
 /// What was run. With the same version of the program, `scenario_text` and the two models give the same trace and the
@@ -78,7 +78,7 @@ impl Recipe {
             ends: scenario.ends,
             law: scenario.law.to_string(),
             rate_hz: scenario.rate_hz,
-            gains: gains(scenario),
+            gains: gains(config),
             payload_kg: scenario.payload.map_or(0.0, |payload| payload.mass),
             payload: scenario.payload,
             mismatch: scenario.mismatch,
@@ -90,11 +90,10 @@ impl Recipe {
     }
 }
 
-fn gains(scenario: &Scenario) -> GainsInForce {
-    let asked = scenario.gains.unwrap_or_default();
-    let [bandwidth, damping, observer] = asked
-        .each((1.0 / scenario.rate_hz) as f32)
-        .map(|(_, _, value)| value);
+fn gains(config: &RunConfig) -> GainsInForce {
+    let asked = config.scenario.gains.unwrap_or_default();
+    let each = asked.each(&config.own_gains());
+    let [bandwidth, damping, observer] = each.map(|(_, _, value)| value);
     GainsInForce {
         bandwidth,
         damping,

@@ -6,6 +6,7 @@ use std::path::Path;
 use plant_sim::report::FILE;
 use plant_sim::run::Results;
 use plant_sim::verdicts::{ending, finding, limit};
+use sim::metrics::CycleResult;
 use sim::model::AXES;
 use sim::scenario::Ending;
 use sim::setup::RunConfig;
@@ -183,6 +184,7 @@ fn load(summary: &Summary, text: &mut String) {
         "at its limit",
         saturation.map(|time| format!("{:.1} ms", time * 1e3)),
     );
+    heat(summary, text);
     if summary.pace < 1.0 {
         line!(
             text,
@@ -190,6 +192,28 @@ fn load(summary: &Summary, text: &mut String) {
             summary.pace * 100.0
         );
     }
+}
+
+/// How warm the motors got.
+fn heat(summary: &Summary, text: &mut String) {
+    let heat = &summary.heat;
+    let slowed = heat.slowed_from_s.map_or_else(String::new, |from| {
+        let each = &summary.each_cycle;
+        let time = |cycle: Option<&CycleResult>| cycle.and_then(|cycle| cycle.cycle_time_s);
+        let slower = match (time(each.first()), time(each.last())) {
+            (Some(first), Some(last)) if last > first => {
+                format!(": the last cycle took {last:.3} s, the first {first:.3} s")
+            }
+            _ => String::new(),
+        };
+        format!("; moves slowed down from {from:.1} s on{slower}")
+    });
+    line!(
+        text,
+        "  heat              {} at the most {:.0} % of what it may have for ever{slowed}",
+        heat.warmest,
+        heat.greatest * 100.0
+    );
 }
 
 /// End of the run.

@@ -1,0 +1,163 @@
+//! What the steps of the encoders make of the torques, foreseen: see [`Gains`].
+
+use firmware::control::laws::Gains;
+use firmware::mechanics::arm::ArmModel;
+
+use super::{RunConfig, SetupError};
+use crate::model::AXES;
+use crate::scenario::Scenario;
+
+/// Bandwidth (rad/s) below which the controller's own gains are refused: it takes a tenth of a second to answer, in which friction alone
+/// puts the tool off by millimetres.
+const LEAST_BANDWIDTH: f64 = 10.0;
+/// Least control rate, Hz.
+const LEAST_RATE: f64 = 100.0;
+
+impl RunConfig {
+    /// The gains that the controller has by itself.
+    pub(crate) fn own_gains(&self) -> Gains {
+        Gains::for_arm(&ArmModel::from(&self.nominal), self.period())
+    }
+
+    /// The scenario with every gain, if it has any.
+    pub(crate) fn asked(&self) -> Scenario {
+        let mut scenario = self.scenario.clone();
+        scenario.gains = scenario.gains.map(|it| it.complete(&self.own_gains()));
+        scenario
+    }
+
+    fn period(&self) -> f32 {
+        (1.0 / self.scenario.rate_hz) as f32
+    }
+
+    /// The axis on which a count makes the greatest step of the torque with these gains, and that step as a share of its limit.
+    fn step(&self, gains: &Gains) -> (&'static str, f64) {
+        let (axis, share) = gains.encoder_step(&ArmModel::from(&self.nominal), self.period());
+        (AXES[axis as usize], f64::from(share))
+    }
+
+    /// Whether the scenario leaves bandwidth and observer to the controller.
+    fn leaves_gains(&self) -> bool {
+        let asked = self.scenario.gains.unwrap_or_default();
+        asked.bandwidth.is_none() && asked.observer.is_none()
+    }
+
+    /// The robot, and what its encoders are.
+    fn subject(&self) -> String {
+        format!(
+            "model {}: drive.encoder_counts_per_motor_rev is {}",
+            self.nominal.name, self.nominal.drive.encoder_counts
+        )
+    }
+
+    /// Encoders so coarse that gains which they bear do not hold the arm.
+    pub(super) fn too_coarse(&self) -> Option<SetupError> {
+        let bandwidth = f64::from(self.own_gains().bandwidth);
+        let usual = Gains::for_period(self.period());
+        let (axis, share) = self.step(&usual);
+        let is_lowered = share > f64::from(Gains::ENCODER_STEP);
+        if !is_lowered || bandwidth >= LEAST_BANDWIDTH || !self.leaves_gains() {
+            return None;
+        }
+        // What is left goes with the counts, and against the rate.
+        let left = f64::from(usual.bandwidth) * f64::from(Gains::ENCODER_STEP) / share;
+        let (counts, rate_hz) = (self.nominal.drive.encoder_counts, self.scenario.rate_hz);
+        let slower = (rate_hz * left / LEAST_BANDWIDTH).floor();
+        Some(SetupError::Coarse {
+            robot: self.nominal.name.clone(),
+            counts,
+            rate_hz,
+            percent: share * 100.0,
+            axis,
+            bandwidth: left,
+            least: (f64::from(counts) * LEAST_BANDWIDTH / left).ceil(),
+            slower: if slower < LEAST_RATE {
+                String::new()
+            } else {
+                format!(", or a rate_hz up to {slower}")
+            },
+        })
+    }
+
+    /// Encoders that cost the loop something, and what to do.
+    pub(super) fn coarse(&self) -> Option<String> {
+        let usual = Gains::for_period(self.period());
+        let (axis, share) = self.step(&usual);
+        if self.leaves_gains() {
+            let enough = self.finer(&usual)?;
+            let own = self.own_gains();
+            let law = self.scenario.law;
+            let blind = if law.law.takes_compensation() {
+                String::new()
+            } else {
+                format!(
+                    "; {law} has no model of the arm and follows by its gains alone, so that fast moves may end with a following error"
+                )
+            };
+            return Some(format!(
+                "{}, coarse at {} Hz: with a bandwidth of {:.0} rad/s a count would be {:.0} % of the torque limit of the {axis}; the \
+                 controller uses gains.bandwidth {:.1} and gains.observer {:.1}, with which the tool is as much further off its path; a lower \
+                 rate_hz bears more, and {enough} counts all{blind}",
+                self.subject(),
+                self.scenario.rate_hz,
+                usual.bandwidth,
+                share * 100.0,
+                own.bandwidth,
+                own.observer,
+            ));
+        }
+        let advice = self.lower_gains()?;
+        Some(format!(
+            "{advice}: torques swing, which slows moves down and may stop the arm for chatter"
+        ))
+    }
+
+    /// What may help a run that its controller stops, where encoders are too coarse for the usual gains.
+    pub(crate) fn encoder_advice(&self) -> Option<String> {
+        let coarse = || {
+            let least = self.finer(&Gains::for_period(self.period()))?;
+            Some(format!(
+                "{}, coarse at {} Hz, so that gains are low: a lower speed, a lower rate_hz, {least} counts or a law with a model of the arm, \
+                 such as computed-torque, may help",
+                self.subject(),
+                self.scenario.rate_hz
+            ))
+        };
+        self.lower_gains().or_else(coarse)
+    }
+
+    /// Counts that bear these gains, where the encoders do not.
+    fn finer(&self, gains: &Gains) -> Option<f64> {
+        let needed = self.step(gains).1 / f64::from(Gains::ENCODER_STEP);
+        let counts = f64::from(self.nominal.drive.encoder_counts);
+        (needed > 1.0).then(|| (counts * needed).ceil())
+    }
+
+    /// Which gains to lower to what, where the encoders are too coarse for those of the scenario.
+    pub(crate) fn lower_gains(&self) -> Option<String> {
+        let own = self.own_gains();
+        let asked = self.scenario.gains.unwrap_or_default();
+        let [bandwidth, damping, observer] = asked.each(&own).map(|(_, _, gain)| gain as f32);
+        let gains = Gains {
+            bandwidth,
+            damping,
+            observer,
+        };
+        let (axis, share) = self.step(&gains);
+        let most = f64::from(Gains::ENCODER_STEP);
+        // What the controller lowers by itself ends next to it.
+        if share <= most * 1.001 {
+            return None;
+        }
+        let lowered = |gain: f32| (f64::from(gain) * most / share * 10.0).floor() / 10.0;
+        Some(format!(
+            "{}: at {} Hz with gains.bandwidth {bandwidth} and gains.observer {observer} a count of the {axis} is {:.0} % of its torque \
+             limit; lower gains.bandwidth to {} and gains.observer to {}, or leave both out",
+            self.subject(),
+            self.scenario.rate_hz,
+            share * 100.0,
+            lowered(bandwidth),
+            lowered(observer),
+        ))
+    }
+}
