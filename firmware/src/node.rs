@@ -32,6 +32,8 @@ use peers::Pulse;
 
 /// Default age of the feedback at which the drives count as silent: torque off, brake.
 pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
+/// Samples that a feedback can be ahead of the last one: the default of that age at the greatest rate, 10 kHz.
+const FARTHEST: u32 = 10 * PEER_TIMEOUT_MS;
 /// Planning pauses every tenth sample, for what need not be looked at more often, and so that no report waits longer: half the
 /// period of the state at 1 kHz, for a tenth of the planning. Counted in samples and not in time, so that the same feedback gives the same torques.
 const REPORT_SAMPLES: u32 = 10;
@@ -226,11 +228,12 @@ impl Node {
     }
 
     /// Judges the place of a feedback. As long as there is torque, one whose sample is not new is old whatever its counter says, half a turn
-    /// of that late or sent by another node, and must not take the place of the next one.
+    /// of that late or sent by another node, and must not take the place of the next one. Nor may one from so far ahead that the feedback
+    /// would have been missed long before: all that follow would be old.
     fn judge(&mut self, feedback: &Feedback, counter: u8) -> Verdict {
         if let Some((last, _)) = self.newest
             && let behind = last.wrapping_sub(feedback.sample)
-            && behind < u32::MAX / 2
+            && behind < u32::MAX - FARTHEST
             && self.controller.state().is_powered()
         {
             return match behind {
@@ -254,6 +257,7 @@ impl Node {
             None => 1,
             Some((last, _)) => feedback.sample.wrapping_sub(last).max(1),
         };
+        let steps = steps.saturating_add(self.controller.take_missed());
         self.newest = Some((feedback.sample, now));
         // By themselves they change nothing.
         let is_felt = steps > 1 || !feedback.status.contains(DriveStatus::TORQUE_ON);

@@ -75,7 +75,9 @@ fn latch(latch: Latch) -> &'static str {
 fn seen_by(cause: Cause) -> &'static str {
     match cause {
         Cause::SelfTest => "known answers of mathematics, kinematics and CRC; ranges of the model",
-        Cause::FeedbackLost => "sample number of the next feedback",
+        Cause::FeedbackLost => {
+            "sample number of the next feedback; axes that have moved several times as far as in a sample"
+        }
         Cause::Babbling => {
             "frames that are no message, with no feedback in between; felt where feedback is lost or late, or the drives have let go"
         }
@@ -104,7 +106,9 @@ fn seen_by(cause: Cause) -> &'static str {
             "status of the drives; a jump no axis can make; away from the reference, faster and faster, against the torque"
         }
         Cause::Collision => "effort that the model does not explain, by the observer",
-        Cause::Chatter => "torques that swing from sample to sample",
+        Cause::Chatter => {
+            "torques that swing from sample to sample, or more often than a plan's can"
+        }
         Cause::Overload => "mean square of the effort over that of continuous operation",
         other => panic!("{other} is in the table: say what detects it"),
     }

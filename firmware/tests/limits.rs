@@ -125,11 +125,11 @@ fn a_limit_is_kept_where_it_is_reached() {
         });
         let error = limits.following_error;
         assert_eq!(
-            monitor.check(&moving, &furthest, &ZERO, &error, &error),
+            monitor.check(&moving, &furthest, &ZERO, [&error, &error, &ZERO]),
             None
         );
         assert_eq!(
-            monitor.check(&moving, &middle(), &speed, &error, &error),
+            monitor.check(&moving, &middle(), &speed, [&error, &error, &ZERO]),
             None
         );
     }
@@ -148,7 +148,7 @@ fn the_end_of_the_range_that_was_passed_is_named() {
         at.z = q;
         let still = readings(ZERO, ZERO);
         let faults: Vec<_> = (0..3)
-            .map(|_| monitor.check(&still, &at, &ZERO, &ZERO, &ZERO))
+            .map(|_| monitor.check(&still, &at, &ZERO, [&ZERO, &ZERO, &ZERO]))
             .collect();
         let [None, None, Some(fault)] = faults[..] else {
             panic!("{faults:?}");
@@ -175,7 +175,7 @@ fn why(velocities: [f32; 3], qd: f32, error: f32) -> Fault {
     let faults = velocities.map(|velocity| {
         let velocity = Vector4::new(0.0, velocity, 0.0, 0.0);
         let readings = readings(velocity, Vector4::new(0.0, 1.0, 0.0, 0.0));
-        monitor.check(&readings, &middle(), &qd, &error, &error)
+        monitor.check(&readings, &middle(), &qd, [&error, &error, &ZERO])
     });
     let [None, None, Some(fault)] = faults else {
         panic!("{faults:?}");

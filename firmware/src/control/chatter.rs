@@ -8,6 +8,7 @@ use nalgebra::Vector4;
 
 use super::fault::CHATTER_PERCENT;
 use crate::mechanics::arm::Axis;
+use crate::mechanics::math::clamp;
 
 /// Samples of a look: two second differences, of which one shows a swing of four or five samples that the looks happen to keep time
 /// with.
@@ -20,13 +21,35 @@ const MOST: f32 = 2.0;
 /// from that.
 const SHORT: f32 = 1e-3;
 
+/// Times that a torque is cut to one side and then to the other that are a swing, and the time between two cuts below which a plan cannot
+/// be the reason, as a multiple of the time that one takes from no torque to the greatest: it takes twice that time from limit to limit.
+const TURNS: u8 = 5;
+/// Share of swing that stands for a torque that for long changes as fast as that of a plan does at the most.
+const STEEP: f32 = CHATTER_PERCENT as f32 * 1e-2;
+const SOON: f32 = 2.0;
+
 /// Watches torques for chatter.
 #[derive(Clone, Copy, Debug)]
 pub struct Chatter {
     /// Torques of the last samples, in turn.
     torques: [Vector4<f32>; KEPT],
-    oldest: u8,
+    /// Samples kept until now, which number them.
+    kept: u16,
     mean: f32,
+    /// Mean rates of change, as shares of the greatest one of a plan.
+    slopes: Vector4<f32>,
+    cuts: [Cut; 4],
+}
+
+/// What has been cut off the torque of an axis.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cut {
+    /// Whether it was above 0 when it was last cut.
+    was_above: bool,
+    /// Times in a row that it was cut to the other side sooner than a plan can.
+    turns: u8,
+    /// Number of the last sample in which it was cut.
+    last: u16,
 }
 
 impl Chatter {
@@ -34,17 +57,19 @@ impl Chatter {
     pub fn new() -> Self {
         Self {
             torques: [Vector4::zeros(); KEPT],
-            oldest: 0,
+            kept: 0,
             mean: 0.0,
+            slopes: Vector4::zeros(),
+            cuts: [Cut::default(); 4],
         }
     }
 
     /// Keeps the motor torques of a sample, N m.
     pub fn keep(&mut self, torque: &Vector4<f32>) {
-        if let Some(place) = self.torques.get_mut(usize::from(self.oldest)) {
+        if let Some(place) = self.torques.get_mut(usize::from(self.kept) % KEPT) {
             *place = *torque;
         }
-        self.oldest = (self.oldest + 1) % KEPT as u8;
+        self.kept = self.kept.wrapping_add(1);
     }
 
     /// Motor torques of the last samples, N m, in no order.
@@ -52,10 +77,22 @@ impl Chatter {
         &self.torques
     }
 
-    /// Looks at the last samples, `period` seconds apart. Returns the axis that swings most and the mean swing of all (%) if that is too much.
-    pub fn look(&mut self, limit: &Vector4<f32>, period: f32) -> Option<(Axis, f32)> {
+    /// Motor torques of the last sample, N m.
+    pub fn last(&self) -> Vector4<f32> {
+        let last = usize::from(self.kept.wrapping_sub(1)) % KEPT;
+        self.torques.get(last).copied().unwrap_or_default()
+    }
+
+    /// Looks at the last samples, `period` seconds apart. Returns the axis that swings most and the mean swing of all (%) if that is too much, or
+    /// that of a slower swing in the same measure. A plan takes `rise` seconds from no torque to the greatest.
+    pub fn look(
+        &mut self,
+        limit: &Vector4<f32>,
+        rise: &Vector4<f32>,
+        period: f32,
+    ) -> Option<(Axis, f32)> {
         let [a, b, c, d] = self.torques;
-        let [a, b, c, d] = match self.oldest {
+        let [a, b, c, d] = match usize::from(self.kept) % KEPT {
             0 => [a, b, c, d],
             1 => [b, c, d, a],
             2 => [c, d, a, b],
@@ -63,17 +100,53 @@ impl Chatter {
         };
         let before = (a - b * 2.0 + c).abs();
         let now = (b - c * 2.0 + d).abs();
-        let swings = before.sup(&now).component_div(limit);
+        let swings = before.sup(&now);
+        // Less what noise may have to do with it.
+        let slopes = ((d - a).abs() - swings).component_div(limit);
+        let slopes = slopes.component_mul(rise) / (period * (KEPT - 1) as f32);
+        self.slopes += (slopes.map(|slope| clamp(slope, 0.0, MOST)) - self.slopes) / LOOKS;
+        let swings = swings.component_div(limit);
         let sum = swings.sum() * (SHORT / period).min(1.0);
         self.mean += (sum.min(MOST) - self.mean) / LOOKS;
-        let percent = self.mean * 100.0;
+        let steepest = self.slopes.max() * STEEP;
+        let (share, shares) = if steepest > self.mean {
+            (steepest, &self.slopes)
+        } else {
+            (self.mean, &swings)
+        };
+        let percent = share * 100.0;
         if percent <= f32::from(CHATTER_PERCENT) {
             return None;
         }
-        let greatest = swings.max();
+        let greatest = shares.max();
         let mut axes = Axis::ALL.into_iter();
-        let axis = axes.find(|axis| axis.of(&swings) >= greatest)?;
+        let axis = axes.find(|axis| axis.of(shares) >= greatest)?;
         Some((axis, percent))
+    }
+
+    /// Judges what is cut off the torques of the sample that comes next. Returns the axis whose torque swings from limit to limit and back; a plan
+    /// takes `rise` samples from none to the greatest torque.
+    // Out of line: rare in a sample.
+    #[inline(never)]
+    pub fn cut(&mut self, excess: &Vector4<f32>, rise: &Vector4<f32>) -> Option<Axis> {
+        let now = self.kept;
+        let mut swinging = None;
+        let axes = Axis::ALL.into_iter().zip(excess.iter().zip(rise.iter()));
+        for ((axis, (excess, rise)), cut) in axes.zip(self.cuts.iter_mut()) {
+            if *excess == 0.0 {
+                continue;
+            }
+            let is_above = *excess > 0.0;
+            if is_above != cut.was_above {
+                let soon = f32::from(now.wrapping_sub(cut.last)) < SOON * rise;
+                cut.turns = if soon { cut.turns.saturating_add(1) } else { 0 };
+                if cut.turns >= TURNS {
+                    swinging = Some(axis);
+                }
+            }
+            (cut.was_above, cut.last) = (is_above, now);
+        }
+        swinging
     }
 }
 

@@ -20,6 +20,7 @@ use nalgebra::Vector4;
 use protocol::messages::{
     Cause, ControlWord, Fault, LimitFlags, MotionReply, MotionRequest, Operation, Outcome, Refusal,
 };
+use protocol::parameters::ControllerParameter as Parameter;
 use protocol::time::Period;
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +29,7 @@ use crate::control::heat::Heat;
 use crate::control::laws::observer::MomentumObserver;
 use crate::control::laws::{ControlInput, Memory, Model, Motion, Task};
 use crate::control::limits;
-use crate::control::monitor::Monitor;
+use crate::control::monitor::{Felt, Monitor};
 use crate::control::phase::{Phase, Probe};
 use crate::control::readings::Readings;
 use crate::control::setup::Setup;
@@ -62,6 +63,8 @@ pub struct Config {
 struct Fixed {
     arm: ArmModel,
     period: Period,
+    /// Least corner of the observer, by which the arm is watched, rad/s.
+    least_corner: f32,
 }
 
 impl Config {
@@ -109,6 +112,8 @@ pub struct Controller {
     fault: Fault,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
     saturated: u32,
+    /// Samples more than the drives have counted that have passed since the last one.
+    missed: u32,
     /// Samples in a row in which an encoder did not move with its axis at its torque limit, those off the reference several times.
     stuck: u32,
     /// A fault not reported to the peers yet.
@@ -122,6 +127,8 @@ pub struct Controller {
     chatter: Chatter,
     excess: Vector4<f32>,
     error: Vector4<f32>,
+    /// Velocities measured in the last sample.
+    last_qd: Vector4<f32>,
     replies: Deque<MotionReply, { 2 * CAPACITY }>,
     unanswered: u16,
     queue: MoveQueue,
@@ -139,6 +146,7 @@ impl Controller {
             config: Fixed {
                 arm: config.arm,
                 period: config.period,
+                least_corner: Parameter::Observer.initial(config.period.seconds()),
             },
             setup: config.setup,
             state: State::SelfTest,
@@ -156,6 +164,7 @@ impl Controller {
             alarm: None,
             saturated: 0,
             stuck: 0,
+            missed: 0,
             queue: MoveQueue::new(),
             setpoint: Setpoint::rest(Vector4::zeros()),
             memory: Memory::new(),
@@ -165,6 +174,7 @@ impl Controller {
             chatter: Chatter::new(),
             excess: Vector4::zeros(),
             error: Vector4::zeros(),
+            last_qd: Vector4::zeros(),
             replies: Deque::new(),
             unanswered: 0,
         }
@@ -239,14 +249,25 @@ impl Controller {
         probe.end(Phase::Kinematics);
         let model = Model::new(&self.body, &trig, &motion);
         probe.end(Phase::Dynamics);
-        let corner = self.setup.selection.gains.observer;
-        self.observer.update(&motion, &model, corner);
+        let corners = [
+            self.setup.selection.gains.observer,
+            self.config.least_corner,
+        ];
+        self.observer.update(&motion, &model, corners);
+        let felt = self.observer.residual();
+        if let Some(axis) = self.monitor.feels(felt) {
+            let numbers = [&motion.qd, &self.last_qd, felt, &self.error, &reference.qd];
+            let felt = self.monitor.felt(axis, readings, numbers);
+            if felt != Felt::Nothing {
+                return self.react(felt);
+            }
+        }
         let input = ControlInput {
             motion: &motion,
             task: &task,
             model: &model,
             nominal_inertia: &self.body.nominal_inertia,
-            disturbance: self.observer.residual(),
+            disturbance: self.observer.for_law(corners),
         };
         let torque = self.setup.selection.torque(&input, &mut self.memory);
         if !torque.iter().all(|torque| torque.is_finite()) {
@@ -259,6 +280,7 @@ impl Controller {
         let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
         self.excess = limited.excess;
         let qd = motion.qd;
+        self.last_qd = qd;
         if limited.flags != LimitFlags::EMPTY {
             self.limits = self.limits | limited.flags;
             self.ease(&torque, &qd);

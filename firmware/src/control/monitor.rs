@@ -10,6 +10,24 @@ use crate::mechanics::arm::{ArmModel, Axis};
 
 /// Share of the speed that stops an axis from which on it counts as one that is to move.
 const SLOW: f32 = 0.01;
+/// Share of the speed at which it was to go on from which on it goes back as a reversed encoder shows it.
+const BACK: f32 = 0.75;
+
+/// Square of the share of its speed that an arm may be off by where the drives have missed a sample, as it speeds up meanwhile; and the most
+/// times as far as in one sample that it may have gone: after more, they have switched off.
+const ALIKE: f32 = 0.0225;
+const MOST_TIMES: u32 = 8;
+
+/// What is felt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Felt {
+    /// Nothing yet.
+    Nothing,
+    /// A fault.
+    Fault(Fault),
+    /// So many samples more have passed than the drives have counted.
+    Missed(u32),
+}
 
 /// Limits whose violation stops the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -132,14 +150,13 @@ impl Monitor {
         Some(Fault::value(cause, f32::from(status.bits()), 0.0))
     }
 
-    /// Judges one sample; `error` is reference minus measured position, `before` that of the last sample.
+    /// Judges one sample; `error` is reference minus measured position, `before` that of the last sample, and `last_qd` its velocity.
     pub fn check(
         &mut self,
         readings: &Readings,
         q: &Vector4<f32>,
         qd: &Vector4<f32>,
-        error: &Vector4<f32>,
-        before: &Vector4<f32>,
+        [error, before, last_qd]: [&Vector4<f32>; 3],
     ) -> Option<Fault> {
         let following = first_beyond(error, &self.following_error);
         let speed = first_beyond(qd, &self.speed);
@@ -148,7 +165,8 @@ impl Monitor {
             (self.following_count, self.speed_count, self.range_count) = (0, 0, 0);
             return None;
         }
-        self.trip(readings, [q, qd, error, before], [following, speed, range])
+        let numbers = [q, qd, error, before, last_qd];
+        self.trip(readings, numbers, [following, speed, range])
     }
 
     /// Out of line: rarely reached in a sample.
@@ -156,13 +174,15 @@ impl Monitor {
     fn trip(
         &mut self,
         readings: &Readings,
-        [q, qd, error, before]: [&Vector4<f32>; 4],
+        [q, qd, error, before, last_qd]: [&Vector4<f32>; 5],
         [following, speed, range]: [Option<Axis>; 3],
     ) -> Option<Fault> {
         // A jump shows as a speed beyond its limit, if not as a following error.
         let jump = self.jump * readings.steps as f32;
         let moved = error - before;
-        if let Some(axis) = first_beyond(&moved, &jump) {
+        if let Some(axis) = first_beyond(&moved, &jump)
+            && self.missed(readings, qd, last_qd) == 0
+        {
             return Some(of_axis(Cause::EncoderFault, axis, &moved, &jump));
         }
         if self.following_count == 0 {
@@ -206,39 +226,68 @@ impl Monitor {
     }
 
     /// Judges what an axis feels. An arm that has met something feels it, and so does one whose encoder does not show where it is: then it is
-    /// what its loop makes of that. `wanted` is the velocity of the reference.
+    /// what its loop makes of that. `last_qd` is the velocity in the last sample, and `wanted` that of the reference.
     // Out of line: rarely reached in a sample.
     #[inline(never)]
     pub fn felt(
         &mut self,
         axis: Axis,
         readings: &Readings,
-        [qd, disturbance, error, wanted]: [&Vector4<f32>; 4],
-    ) -> Option<Fault> {
+        [qd, last_qd, disturbance, error, wanted]: [&Vector4<f32>; 5],
+    ) -> Felt {
         if self.collision_count == 0 {
+            // Of two in a row, the second is where the observer began anew.
+            let missed = match self.missed(readings, qd, last_qd) {
+                0 => self.missed(readings, last_qd, qd),
+                missed => missed,
+            };
+            if missed > 0 {
+                return Felt::Missed(missed);
+            }
             (self.velocity_felt, self.wanted) = (readings.velocity, *wanted);
         }
-        count(&mut self.collision_count, Some(axis), self.needed)?;
+        if count(&mut self.collision_count, Some(axis), self.needed).is_none() {
+            return Felt::Nothing;
+        }
         // Readings of whatever axis that do not go where it went until now are not those of an obstacle, which only slows it down in so few
-        // samples.
-        let (wanted, now) = (self.wanted, wanted);
+        // samples, nor of a load that was lost or added, which does not throw it back as fast as it went.
+        let (before, now) = (self.wanted, wanted);
         let slow = self.speed * SLOW;
-        let was_to_move = |axis: &Axis| axis.of(&wanted).abs() > axis.of(&slow);
+        let was_to_move = |axis: &Axis| axis.of(&before).abs() > axis.of(&slow);
         let mut moving = Axis::ALL.into_iter().filter(was_to_move);
         let mut stands = moving.clone().chain([axis]);
-        let goes_on = |axis: &Axis| axis.of(now) * axis.of(&wanted) > 0.0;
-        let turned = |axis: &Axis| goes_on(axis) && axis.of(qd) * axis.of(&wanted) < 0.0;
-        Some(
-            if let Some(axis) = stands.find(|axis| readings.is_still(*axis)) {
-                of_axis(Cause::StuckSensor, axis, error, &Vector4::zeros())
-            } else if let Some(axis) = moving.find(turned) {
-                of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
-            } else if readings.defies_torque(axis, axis.of(&self.velocity_felt)) {
-                of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
-            } else {
-                of_axis(Cause::Collision, axis, disturbance, &self.collision)
-            },
-        )
+        let is_still = |axis: &Axis| readings.stays_still(*axis, axis.of(&self.velocity_felt));
+        let turned = |axis: &Axis| {
+            let (before, now, found) = (axis.of(&before), axis.of(now), axis.of(qd));
+            now * before > 0.0 && found * before < -BACK * before * before
+        };
+        // Away from its reference, and not ahead of it on the same way.
+        let is_away = (axis.of(qd) - axis.of(now)).abs() > 0.5 * axis.of(qd).abs();
+        Felt::Fault(if let Some(axis) = stands.find(is_still) {
+            of_axis(Cause::StuckSensor, axis, error, &Vector4::zeros())
+        } else if let Some(axis) = moving.find(turned) {
+            of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
+        } else if is_away && readings.runs_away(axis, axis.of(&self.velocity_felt)) {
+            of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
+        } else {
+            of_axis(Cause::Collision, axis, disturbance, &self.collision)
+        })
+    }
+
+    /// Samples that the drives have left out before this one without counting them, as when their clock has missed a tick: then every axis
+    /// has moved a whole number of times as far as in the last one.
+    fn missed(&self, readings: &Readings, qd: &Vector4<f32>, last_qd: &Vector4<f32>) -> u32 {
+        let last = last_qd.component_div(&self.speed);
+        let found = qd.component_div(&self.speed);
+        let square = last.dot(&last);
+        let times = (found.dot(&last) / square + 0.5) as u32;
+        let off = found - last * times as f32;
+        let is_alike = square > SLOW * SLOW && off.dot(&off) < ALIKE * found.dot(&found);
+        if readings.steps == 1 && is_alike && (2..=MOST_TIMES).contains(&times) {
+            times - 1
+        } else {
+            0
+        }
     }
 
     /// Forgets the counts, for a new start.

@@ -7,6 +7,9 @@ use crate::mechanics::arm::Axis;
 
 /// Speed of a motor up to which its encoder does not move, rad/s: some counts in a sample.
 const STILL: f32 = 0.5;
+/// How much faster a motor gets within some samples whose encoder makes its loop drive it away. One that is pushed with a force that the
+/// torque resists does not.
+const FASTER: f32 = 1.25;
 
 /// Drive readings of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +29,12 @@ pub struct Readings {
 impl Readings {
     /// Whether the encoder of an axis does not move. Asked of the motor: the lift moves with the wrist as well.
     pub fn is_still(&self, axis: Axis) -> bool {
-        axis.of(&self.velocity).abs() <= STILL
+        is_still(axis.of(&self.velocity))
+    }
+
+    /// The same of these readings and of those with the velocity `before`, rad/s. An axis that turns back stands for an instant only.
+    pub fn stays_still(&self, axis: Axis, before: f32) -> bool {
+        self.is_still(axis) && is_still(before)
     }
 
     /// Whether the motor of an axis moves against its torque and faster than at `before`, rad/s.
@@ -34,4 +42,14 @@ impl Readings {
         let velocity = axis.of(&self.velocity);
         velocity * axis.of(&self.torque) < 0.0 && velocity.abs() > before.abs()
     }
+
+    /// The same for one that went the same way before and is quite some faster now.
+    pub fn runs_away(&self, axis: Axis, before: f32) -> bool {
+        let velocity = axis.of(&self.velocity);
+        self.defies_torque(axis, FASTER * before) && velocity * before > 0.0
+    }
+}
+
+fn is_still(velocity: f32) -> bool {
+    velocity.abs() <= STILL
 }

@@ -14,7 +14,7 @@ mod record;
 use protocol::messages::Cause;
 use record::{Record, run_of};
 use sim::run::in_process;
-use sim::scenario::Scenario;
+use sim::scenario::{GainsSpec, Scenario};
 use sim::setup::RunConfig;
 use sim::summary::Summary;
 
@@ -99,4 +99,160 @@ fn a_warm_arm_slows_down_and_goes_on() {
         })
         .fold(0.0, f64::max);
     assert!((0.85..1.0).contains(&warmest), "{warmest}");
+}
+
+/// The first fault of a gate in motion, with the time from the beginning of what is planned.
+fn first(scenario: Scenario, fault: &str, begin: f64) -> Option<(&'static str, f64)> {
+    let (summary, _) = run_of(scenario, &[fault], 5);
+    let first = summary.faults.first()?;
+    Some((first.cause, first.time_s - begin))
+}
+
+fn scenario(name: &str, rate: f64, law: &str) -> Scenario {
+    let mut scenario = Scenario::built_in(name).unwrap();
+    scenario.cycles = 1;
+    scenario.rate_hz = rate;
+    scenario.law = law.parse().unwrap();
+    scenario.requirements.clear();
+    scenario
+}
+
+/// How often the torque of an axis goes from beyond half of its limit to one side to the other within 15 ms, at the most in a row.
+fn swings(record: &Record, until: f64) -> u32 {
+    let limits = RunConfig::new(Scenario::built_in("gate").unwrap())
+        .nominal
+        .limits
+        .effort;
+    let mut most = 0;
+    for (axis, limit) in limits.iter().enumerate() {
+        let (mut side, mut last, mut count) = (0.0, 0.0, 0);
+        let samples = record.truths.iter().map(|it| &it.plant);
+        for it in samples.take_while(|it| it.t < until) {
+            let share = it.tau[axis] / limit;
+            if share.abs() < 0.5 {
+                continue;
+            }
+            if share * side < 0.0 {
+                count = if it.t - last < 0.015 { count + 1 } else { 0 };
+                most = most.max(count);
+            }
+            (side, last) = (share.signum(), it.t);
+        }
+    }
+    most
+}
+
+/// A loop that an encoder that lags a little makes swing, too slowly for a difference from sample to sample and too weakly for a
+/// collision, is stopped after a tenth of a second or two of it.
+#[test]
+fn a_loop_that_swings_is_stopped() {
+    let mut chatters = 0;
+    for rate in [500.0, 1000.0, 2000.0] {
+        for law in [
+            "kinematic-joint",
+            "pid",
+            "pd-gravity",
+            "computed-torque:integral",
+            "computed-torque:observer",
+            "computed-torque-task:observer",
+        ] {
+            let (sound, _) = run_of(scenario("gate", rate, law), &[], 5);
+            assert_eq!(sound.faults, [], "{law} at {rate} Hz");
+            for axis in ["shoulder", "elbow", "lift", "wrist"] {
+                for lag in ["0.0025", "0.003", "0.004", "0.006"] {
+                    let fault = format!("encoder:{axis}:slow={lag}@0.15s");
+                    let (summary, record) = run_of(scenario("gate", rate, law), &[&fault], 5);
+                    let told = summary.faults.first();
+                    let swings = swings(&record, told.map_or(f64::MAX, |it| it.time_s));
+                    assert!(swings <= 20, "{law} at {rate} Hz, {fault}: {swings}");
+                    chatters += u32::from(told.is_some_and(|it| it.cause == "chatter"));
+                }
+            }
+        }
+    }
+    assert!(chatters > 40, "{chatters}");
+}
+
+/// As it was found: full torque to both sides for seconds.
+#[test]
+fn an_encoder_that_lags_three_milliseconds_is_felt_in_every_cycle() {
+    for lag in ["0.0025", "0.003"] {
+        let fault = format!("encoder:shoulder:slow={lag}@0.15s");
+        let law = "computed-torque:observer";
+        let (cause, _) = first(scenario("palletise", 1000.0, law), &fault, 0.15).unwrap();
+        assert_eq!(cause, Cause::Chatter.name(), "{fault}");
+    }
+}
+
+/// A tick that the clock of the drives misses is a sample that is bridged, whenever it is; more than a gap in the feedback may
+/// have are told as such a gap, where they can be told from the motion.
+#[test]
+fn a_missed_tick_of_the_clock_is_bridged() {
+    for rate in [1000.0, 2000.0] {
+        for law in ["computed-torque:observer", "pid"] {
+            for at in 0..25 {
+                let begin = 0.25 + 0.013 * f64::from(at);
+                let fault = format!("clock:misses@{begin}s..+1samples");
+                let found = first(scenario("palletise", rate, law), &fault, begin);
+                assert_eq!(found, None, "{law} at {rate} Hz, {fault}");
+            }
+        }
+    }
+    let law = "computed-torque:observer";
+    let told = first(
+        scenario("palletise", 1000.0, law),
+        "clock:misses@0.4s..+6samples",
+        0.4,
+    );
+    assert_eq!(told.unwrap().0, Cause::FeedbackLost.name());
+}
+
+/// A load that is lost or far heavier than announced is no fault of an encoder: an obstacle at most, or a loop that swings since its
+/// gain is that for a heavier arm.
+#[test]
+fn a_load_that_changes_is_not_taken_for_a_broken_encoder() {
+    let mut wrong = Vec::new();
+    for name in ["gate", "palletise"] {
+        for mass in [12.0, 22.0] {
+            for at in 0..20 {
+                let begin = 0.25 + 0.031 * f64::from(at);
+                for fault in ["payload:dropped", "payload:heavier=25"] {
+                    let mut scenario = scenario(name, 1000.0, "computed-torque:observer");
+                    scenario.carry(mass).unwrap();
+                    let fault = format!("{fault}@{begin}s");
+                    let found = first(scenario, &fault, begin).map(|it| it.0);
+                    if let Some("encoder-fault" | "stuck-sensor") = found {
+                        wrong.push((name, mass, fault));
+                    }
+                }
+            }
+        }
+    }
+    // Where a heavy load pushes the elbow back from rest as a reversed encoder would let it run.
+    assert!(wrong.len() <= 3, "of 160: {wrong:?}");
+}
+
+/// The watch has a corner of its own: a slow observer or integral of the law does not make it slow.
+#[test]
+fn an_obstacle_is_felt_as_soon_with_a_slow_observer() {
+    for law in [
+        "computed-torque:observer",
+        "computed-torque:integral",
+        "pid",
+    ] {
+        let times = [None, Some(50.0), Some(1.0)].map(|observer| {
+            let mut scenario = scenario("gate", 1000.0, law);
+            scenario.gains = observer.map(|observer| GainsSpec {
+                observer: Some(observer),
+                ..GainsSpec::default()
+            });
+            let (cause, time) = first(scenario, "payload:caught=20000@0.4s", 0.4).unwrap();
+            assert_eq!(cause, Cause::Collision.name(), "{law}, {observer:?}");
+            time
+        });
+        assert!(
+            times.iter().all(|time| *time < times[0] + 0.01),
+            "{law}: {times:?}"
+        );
+    }
 }

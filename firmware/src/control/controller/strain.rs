@@ -12,13 +12,18 @@ use crate::mechanics::arm::Axis;
 
 /// Time at its torque limit of an axis that is off its reference and whose encoder does not move, s. One that starts or turns back
 /// moves in the next sample: the greatest torque speeds up the stretched arm with the greatest payload by 16 mrad/s in a millisecond.
+/// At least two samples: the mean over one in the middle of which it turns back is none.
 const STUCK_TIME: f32 = 0.0022;
+const STUCK_SAMPLES: u32 = 2;
 /// Share of the following error from which on it is off. One that holds against the others may be at its limit, and stand where it
 /// is meant to: it has [`PATIENCE`] times as long.
 const STUCK_ERROR: f32 = 0.05;
 const PATIENCE: u32 = 8;
 /// Share of its greatest speed below which an axis hardly moves. It passes that within milliseconds when it turns back.
 const SLOW: f32 = 0.1;
+
+/// A torque that swings from limit to limit, %, as [`Chatter`](crate::control::chatter::Chatter) counts it.
+const FULL_SWING: f32 = 400.0;
 
 impl Controller {
     /// Slows down a move for which the axes would need more torque than there is, as with a heavier load than was announced.
@@ -59,12 +64,18 @@ impl Controller {
         match stuck.or(Axis::ALL.into_iter().find(is_still)) {
             Some(axis) if !self.state.is_braking() => {
                 self.stuck += if stuck.is_some() { PATIENCE } else { 1 };
-                if self.stuck as f32 * period > STUCK_TIME * PATIENCE as f32 {
+                let is_long = self.stuck as f32 * period > STUCK_TIME * PATIENCE as f32;
+                if is_long && self.stuck >= STUCK_SAMPLES * PATIENCE {
                     let (error, limit) = (axis.of(&self.error), axis.of(&off));
                     self.blame(axis, Fault::value(Cause::StuckSensor, error, limit));
                 }
             }
             _ => self.stuck = 0,
+        }
+        let rise = self.config.arm.limits.effort_rise_time / period;
+        if let Some(axis) = self.chatter.cut(&excess, &rise) {
+            let limit = f32::from(CHATTER_PERCENT);
+            self.blame(axis, Fault::value(Cause::Chatter, FULL_SWING, limit));
         }
         if let Some(axis) = Axis::ALL.into_iter().find(stands) {
             self.saturated += 1;
@@ -83,7 +94,8 @@ impl Controller {
     pub fn tend(&mut self, samples: u32) {
         let period = self.config.period.seconds();
         let limit = &self.config.arm.drive.motor_torque_limit;
-        if let Some((axis, percent)) = self.chatter.look(limit, period) {
+        let rise = &self.config.arm.limits.effort_rise_time;
+        if let Some((axis, percent)) = self.chatter.look(limit, rise, period) {
             let limit = f32::from(CHATTER_PERCENT);
             self.blame(axis, Fault::value(Cause::Chatter, percent, limit));
         }

@@ -3,9 +3,9 @@
 use nalgebra::Vector4;
 use protocol::messages::{Cause, ControlWord, DriveStatus, Fault, LimitFlags};
 
-use super::Controller;
+use super::{Actions, Controller};
 use crate::control::fault;
-use crate::control::monitor::Monitor;
+use crate::control::monitor::{Felt, Monitor};
 use crate::control::readings::Readings;
 use crate::control::states::{Event, Halt, State};
 use crate::mechanics::body::Body;
@@ -91,23 +91,41 @@ impl Controller {
         let error = self.setpoint.reference.q - q;
         // The reference of the last sample: at most one sample of motion older than `q`.
         let moved = self.setpoint.reference.qd * self.config.period.seconds();
-        if let Some(fault) = self
-            .monitor
-            .check(readings, q, qd, &(error + moved), &self.error)
+        let numbers = [&(error + moved), &self.error, &self.last_qd];
+        if let Some(fault) = self.monitor.check(readings, q, qd, numbers)
             && !(fault.cause == Cause::SoftLimit && self.is_freed(q))
         {
             self.fail(fault);
         }
-        let felt = self.observer.residual();
-        if let Some(axis) = self.monitor.feels(felt) {
-            let wanted = &self.setpoint.reference.qd;
-            let fault = self
-                .monitor
-                .felt(axis, readings, [qd, felt, &error, wanted]);
-            if let Some(fault) = fault {
-                self.fail(fault);
+    }
+
+    /// Reacts to what was felt in this sample. The torques of the last one go on for it: those of the law would be the answer to readings that
+    /// are wrong.
+    // Out of line: rare in a sample.
+    #[inline(never)]
+    pub(super) fn react(&mut self, felt: Felt) -> Actions {
+        match felt {
+            Felt::Fault(fault) => self.fail(fault),
+            Felt::Missed(samples) => {
+                self.missed = samples;
+                self.unlearn();
             }
+            Felt::Nothing => {}
         }
+        let torque = if self.state.is_powered() {
+            self.chatter.last().into()
+        } else {
+            [0.0; 4]
+        };
+        Actions {
+            control: self.control_word(),
+            torque,
+        }
+    }
+
+    /// Samples that have passed besides those that the drives have counted since the last one.
+    pub fn take_missed(&mut self) -> u32 {
+        core::mem::take(&mut self.missed)
     }
 
     /// Counts down the time of the brake. One that has not closed by then does not hold the lift: torque goes on holding it,

@@ -19,6 +19,9 @@ pub struct MomentumObserver {
     previous_torque: Vector4<f32>,
     /// Friction that the laws counted with in the last sample, and in the one before.
     friction: [Vector4<f32>; 2],
+    /// What a law with a corner below the least gets, and what of it is not a share of the residual.
+    slow: Vector4<f32>,
+    rest: Vector4<f32>,
     started: bool,
 }
 
@@ -30,6 +33,8 @@ impl MomentumObserver {
             residual: Vector4::zeros(),
             previous_torque: Vector4::zeros(),
             friction: [Vector4::zeros(); 2],
+            slow: Vector4::zeros(),
+            rest: Vector4::zeros(),
             started: false,
         }
     }
@@ -39,11 +44,20 @@ impl MomentumObserver {
         &self.residual
     }
 
+    /// The same for a law with this corner, of which the residual has `least` or more.
+    pub fn for_law(&self, [corner, least]: [f32; 2]) -> &Vector4<f32> {
+        if corner < least {
+            &self.slow
+        } else {
+            &self.residual
+        }
+    }
+
     /// Estimates the disturbance after one more sample.
     ///
     /// The corner is bounded to half a radian per sample, where the discrete filter still behaves like the continuous
     /// one.
-    pub fn update(&mut self, motion: &Motion<'_>, model: &Model, corner: f32) {
+    pub fn update(&mut self, motion: &Motion<'_>, model: &Model, [corner, least]: [f32; 2]) {
         let period = motion.period;
         // Velocities are means over a sample and stand for its middle. The inertia is that of its end: half a sample of the
         // change M' qd = C qd + C^T qd takes the momentum back to the middle.
@@ -67,8 +81,22 @@ impl MomentumObserver {
         let known = model.gravity + friction;
         self.expected += (torque + model.kinetic_gradient - known + self.residual) * motion.elapsed;
         let greatest = 0.5 / period;
-        let corner = if corner < greatest { corner } else { greatest };
-        self.residual = (momentum - self.expected) * corner;
+        let is_slow = corner < least;
+        let own = if is_slow { least } else { corner };
+        let own = if own < greatest { own } else { greatest };
+        self.residual = (momentum - self.expected) * own;
+        if is_slow {
+            self.filter(corner / own, corner * motion.elapsed);
+        }
+    }
+
+    /// The low-pass with a lower corner of what the residual is the low-pass of: with r that one and s the slow one, a share
+    /// a = corner / own of r and a rest with rest' = corner (r - s).
+    // Out of line: not with the gains that most will have.
+    #[inline(never)]
+    fn filter(&mut self, share: f32, angle: f32) {
+        self.slow = self.rest + self.residual * share;
+        self.rest += (self.residual - self.slow) * angle;
     }
 }
 
