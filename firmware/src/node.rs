@@ -61,10 +61,10 @@ pub struct Node {
     newest: Option<(u32, Instant)>,
     /// Number of samples answered.
     samples: u32,
-    /// Message table that the drives were built from, once they have said so.
+    /// Message table of the operator, once it has greeted.
     schema: Option<u32>,
     overruns: u16,
-    /// Ticks in a row that took too long, and the number of samples at the last one.
+    /// Samples in a row that took too long, and the number of the last one.
     overruns_in_a_row: u8,
     overrun: u32,
     worst_tick: u32,
@@ -259,10 +259,8 @@ impl Node {
         };
         let steps = steps.saturating_add(self.controller.take_missed());
         self.newest = Some((feedback.sample, now));
-        // By themselves they change nothing.
-        let is_felt = steps > 1 || !feedback.status.contains(DriveStatus::TORQUE_ON);
-        if self.strangers >= FLOOD && is_felt {
-            self.blame_flood();
+        if self.strangers >= FLOOD {
+            self.feel_flood(steps, feedback.status);
         }
         self.strangers = 0;
         if self.controller.mode() == Mode::PreOperational

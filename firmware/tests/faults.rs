@@ -79,7 +79,7 @@ fn seen_by(cause: Cause) -> &'static str {
             "sample number of the next feedback; axes that have moved several times as far as in a sample"
         }
         Cause::Babbling => {
-            "frames that are no message, with no feedback in between; felt where feedback is lost or late, or the drives have let go"
+            "frames that are no message, with no feedback in between; felt where feedback is lost, the drives have let go, or nothing is heard of them"
         }
         Cause::BusOff => "CAN controller",
         Cause::Overrun => "time of a sample",

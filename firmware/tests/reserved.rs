@@ -16,7 +16,6 @@ use std::path::Path;
 
 use protocol::messages::{Cause, ParameterError, RefusalReason};
 
-const CAUSES: [Cause; 0] = [];
 const LIMIT_FLAGS: [&str; 9] = [
     "VELOCITY_SHOULDER",
     "VELOCITY_ELBOW",
@@ -103,7 +102,7 @@ fn check<T: Copy + std::fmt::Debug + PartialEq>(
 
 #[test]
 fn causes() {
-    check("Cause", Cause::ALL, &CAUSES, Cause::describe);
+    check("Cause", Cause::ALL, &[], Cause::describe);
 }
 
 #[test]

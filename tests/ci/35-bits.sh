@@ -79,7 +79,7 @@ sed 's/^/  /' "$work/wasm.err"
 echo "- with the controller on the emulated Cortex-M4F"
 source tests/ci/board.bash
 image=$(built mps2-an386 --bin mps2-an386)
-grep -E '^(scenario|gate,(pid|computed-torque:observer)|square,computed-torque-task:observer|pick-place,computed-torque:observer),' \
+grep -E '^(scenario|(gate|bus-off),(pid|computed-torque:observer)|square,computed-torque-task:observer|pick-place,computed-torque:observer),' \
     "$table" >"$work/some"
 runs "$work/some" --controller qemu --image "$image" >"$work/board"
 compare "on the emulated board" "$work/board"

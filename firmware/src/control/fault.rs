@@ -32,10 +32,11 @@ pub const SATURATION_MS: u32 = milliseconds(Parameter::SaturationTime);
 /// Consecutive rejected, stale or repeated feedback frames that stop the arm: two can be noise, and even at 500 Hz
 /// three last no longer than an allowed gap.
 pub const BAD_FRAMES: u16 = Parameter::BadFrames.initial(1.0) as u16;
-/// Frames in a row that are no message, with no feedback in between, that stop the arm: of eight bytes, they fill a bus of 1 Mbit/s for as long as the
-/// drives hold a command at 1 kHz. At half the load of a bus, that many of other devices arrive in 8 ms.
+/// Frames in a row that are no message, with no feedback in between, of a flooded bus: those of eight bytes fill one of 1 Mbit/s for 4 ms.
 pub const FLOOD: u16 = 32;
-/// Ticks in a row that take too long, and stop the arm: as many as samples for which the drives hold a command. A computer without a real-time
+/// And in a longer time, 1/s: other devices leave more of the bus free.
+pub const FLOOD_RATE: f32 = 3000.0;
+/// Samples in a row that take too long, and stop the arm: as many as samples for which the drives hold a command. A computer without a real-time
 /// system is late now and then.
 pub const OVERRUNS: u8 = 5;
 

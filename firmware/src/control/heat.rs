@@ -8,11 +8,12 @@ use nalgebra::Vector4;
 use crate::mechanics::arm::Axis;
 use crate::mechanics::math::clamp;
 
-/// Heat from which on moves begin more slowly, and at which they are as slow as they get.
-const WARM: f32 = 0.9;
+/// Heat from which on moves begin more slowly.
+pub const WARM: f32 = 0.9;
+/// Heat at which they are as slow as they get.
 const HOT: f32 = 1.0;
 /// Least pace for want of cooling. A motor that is too hot even so holds a load that is too heavy.
-const LEAST_PACE: f32 = 0.3;
+pub const LEAST_PACE: f32 = 0.3;
 
 /// Heat of the motors: of some samples in a row, now and then.
 #[derive(Clone, Copy, Debug)]

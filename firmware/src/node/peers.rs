@@ -3,13 +3,14 @@
 use protocol::codec::{self, DecodeError};
 use protocol::e2e::{Profile, Receiver};
 use protocol::frame::CanFrame;
-use protocol::messages::{Cause, Fault, Message, Node as Name};
+use protocol::messages::{Cause, DriveStatus, Fault, Message, Node as Name};
 use protocol::parameters::Store as _;
 use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use super::Node;
-use crate::control::fault::FLOOD;
+use crate::control::fault::{FLOOD, FLOOD_RATE};
+use crate::control::states::State;
 
 /// The heartbeat of another node. As CiA 301 has it, it is watched from the first one on that was heard.
 #[derive(Clone, Debug)]
@@ -111,13 +112,28 @@ impl Node {
         }
     }
 
-    /// Somebody fills the bus. What of the feedback has got through may be late, and whether commands do is for the drives to say.
+    /// Judges frames that have come in place of a feedback, which is now there, `steps` samples after the last one. By themselves they change
+    /// nothing.
     // Out of line: rare.
     #[inline(never)]
-    pub(super) fn blame_flood(&mut self) {
-        let (frames, limit) = (f32::from(self.strangers), f32::from(FLOOD));
-        self.controller
-            .fail(Fault::value(Cause::Babbling, frames, limit));
+    pub(super) fn feel_flood(&mut self, steps: u32, status: DriveStatus) {
+        // While the brake opens the drives may not be on yet.
+        let is_opening = matches!(self.controller.state(), State::Enabling(_));
+        let has_let_go = !status.contains(DriveStatus::TORQUE_ON) && !is_opening;
+        if steps > 1 || has_let_go {
+            self.blame_flood(steps as f32 * self.controller.period());
+        }
+    }
+
+    /// Puts it down to a flood if the bus was full of such frames for `time`, s.
+    fn blame_flood(&mut self, time: f32) {
+        let limit = time * FLOOD_RATE;
+        let limit = f32::from(FLOOD).max(limit);
+        let frames = f32::from(self.strangers);
+        if frames >= limit {
+            self.controller
+                .fail(Fault::value(Cause::Babbling, frames, limit));
+        }
     }
 
     /// Checks the age of the feedback.
@@ -130,9 +146,7 @@ impl Node {
         if age > Duration::from_micros(u64::from((timeout * 1e6) as u32)) {
             let age_ms = age.nanos() as f32 * 1e-6;
             // First what is to blame. Without feedback there is no stop, so the silence follows in any case.
-            if self.strangers >= FLOOD {
-                self.blame_flood();
-            }
+            self.blame_flood(age.nanos() as f32 * 1e-9);
             self.controller
                 .fail(Fault::value(Cause::PeerSilent, age_ms, timeout * 1e3));
             self.newest = None;

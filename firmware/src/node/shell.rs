@@ -14,13 +14,14 @@ impl Node {
         self.controller.fail(Fault::because(Cause::BusOff));
     }
 
-    /// For a shell to report a tick that ended after its deadline. As many of them as [`OVERRUNS`] in a row stop the arm.
+    /// For a shell to report a tick that ended after its deadline. Those of as many samples in a row as [`OVERRUNS`] stop the arm.
     // Out of line: rare.
     #[inline(never)]
     pub fn count_overrun(&mut self) {
         self.overruns = self.overruns.saturating_add(1);
         self.overruns_in_a_row = match self.samples.wrapping_sub(self.overrun) {
-            ..=1 => self.overruns_in_a_row.saturating_add(1),
+            0 if self.overruns_in_a_row > 0 => self.overruns_in_a_row,
+            1 => self.overruns_in_a_row.saturating_add(1),
             _ => 1,
         };
         self.overrun = self.samples;

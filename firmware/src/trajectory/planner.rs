@@ -137,8 +137,9 @@ impl Planner {
         let survey = SURVEY_POINTS as u32 + 1 + 3;
         let compose = ROUNDS as u32 + 1;
         let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
-        // Its ends, and the borders of the travel's segments; motion and torques. A jump has fewer steps than a line, and more borders.
-        let verify = 2 * (LINE_STEPS as u32 + 2 * HALF_STEPS as u32 + 2 + 8);
+        // Its ends, and the borders of the travel's segments; motion and torques. A jump has fewer steps than a line, and the borders of
+        // its strokes.
+        let verify = 2 * (LINE_STEPS as u32 + 2 * HALF_STEPS as u32 + 2 + 12);
         let finish = 1;
         locate + survey + compose + balance + jump::STEPS + verify + finish
     };

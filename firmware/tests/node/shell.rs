@@ -56,3 +56,19 @@ fn samples_that_take_too_long_stop_the_arm_at_the_fifth_in_a_row() {
         .map(|state| (state.overruns, state.cause));
     assert_eq!(last, Some((45, Cause::Overrun)));
 }
+
+/// Several late calls within a sample are one late sample, whatever the number of samples is.
+#[test]
+fn late_calls_of_one_sample_count_once() {
+    let mut bench = Bench::enabled();
+    (0..100).for_each(|_| bench.node.count_overrun());
+    assert_eq!(bench.mode(), Mode::Enabled);
+    for _ in 0..3 {
+        bench.step();
+        (0..2).for_each(|_| bench.node.count_overrun());
+    }
+    assert_eq!(bench.mode(), Mode::Enabled);
+    bench.step();
+    bench.node.count_overrun();
+    assert_eq!(bench.mode(), Mode::FaultReaction);
+}

@@ -76,6 +76,10 @@ fn enable_is_refused_without_a_peer_of_the_same_schema() {
         bench.refusal(MotionRequest::Enable),
         RefusalReason::WrongState
     );
+    assert_eq!(
+        bench.refusal(MotionRequest::FaultReset),
+        RefusalReason::WrongState
+    );
     bench.hello(table::HASH ^ 1);
     assert_eq!(
         bench.refusal(MotionRequest::Enable),

@@ -56,9 +56,6 @@ pub(crate) fn sentence(request: &MotionRequest, refusal: &Refusal) -> String {
 /// forgets that when the drives fall silent.
 fn readiness(request: &MotionRequest, refusal: &Refusal) -> &'static str {
     match (request, refusal.reason) {
-        (_, RefusalReason::SchemaMismatch) => {
-            ", or the controller has forgotten the operator's hello because the drives were silent: they, or the bus between, were cut off"
-        }
         (MotionRequest::Enable, RefusalReason::WrongState) => {
             "; it takes ready, to which the controller comes by itself once it hears the drives and the operator's hello; from fault it takes a \
              fault-reset before"
@@ -178,10 +175,11 @@ mod tests {
     /// A bus that was held before the arm was switched on is not told as a program of another source alone.
     #[test]
     fn a_refusal_to_switch_on_names_silent_drives() {
-        for reason in [RefusalReason::SchemaMismatch, RefusalReason::WrongState] {
-            let text = sentence(&MotionRequest::Enable, &Refusal::because(reason));
-            assert!(text.contains("drives") && text.contains("hello"), "{text}");
-        }
+        let enable = |reason| sentence(&MotionRequest::Enable, &Refusal::because(reason));
+        let text = enable(RefusalReason::WrongState);
+        assert!(text.contains("drives") && text.contains("hello"), "{text}");
+        let text = enable(RefusalReason::SchemaMismatch);
+        assert!(!text.contains("drives"), "{text}");
         let stop = sentence(
             &MotionRequest::Stop,
             &Refusal::because(RefusalReason::WrongState),

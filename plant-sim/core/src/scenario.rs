@@ -50,7 +50,7 @@ pub struct Scenario {
     /// Control law and compensation, such as `computed-torque:observer`.
     pub law: LawChoice,
     /// How the arm is operated: in `manual` it moves only while the operator holds a button, as here he does unless a step says
-    /// otherwise, and no faster at the tool than 250 mm/s.
+    /// otherwise, and no faster at the tool than 250 mm/s, with the laws that have a model of the arm.
     #[serde(default, skip_serializing_if = "OperationName::is_automatic")]
     pub operation: OperationName,
     /// Gains; otherwise the controller's defaults.

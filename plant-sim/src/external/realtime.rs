@@ -76,7 +76,7 @@ impl RealTime {
     }
 
     /// Takes the frames that have arrived; `true` once the command of the current sample is there.
-    fn take(&mut self) -> Result<bool, PeerError> {
+    fn take(&mut self, now: Instant) -> Result<bool, PeerError> {
         let mut answered = false;
         while let Some(frame) = self.remote.link.receive() {
             match sender(&frame) {
@@ -91,8 +91,12 @@ impl RealTime {
                 Some(Name::Drives | Name::Operator) => {
                     return Err(self.remote.second_plant(&frame));
                 }
-                None => {}
+                // The controller has heard it, too.
+                None => self.ask_twin(now, Some(&frame)),
             }
+        }
+        if self.remote.link.take_bus_off() {
+            self.twin.bus_off();
         }
         Ok(answered)
     }
@@ -132,7 +136,7 @@ impl RealTime {
             return Ok(Duration::ZERO);
         }
         loop {
-            if self.take()? {
+            if self.take(now)? {
                 let latency = monotonic().saturating_sub(out);
                 self.clock.answered(latency);
                 return Ok(latency);
@@ -167,7 +171,7 @@ impl Peer for RealTime {
                 }
                 self.next = now + self.period.duration();
                 self.remote.wait(Duration::ZERO);
-                self.take()?;
+                self.take(now)?;
                 Duration::ZERO
             }
         };

@@ -95,6 +95,10 @@ impl Shell {
                 self.take(&stamped);
             }
             if self.link.take_bus_off() {
+                say!(
+                    "controller: the interface of {} has gone bus-off; if it does not come back by itself: ip link set IFACE type can restart-ms 100",
+                    self.bus
+                );
                 self.node.bus_off();
                 self.poll(None);
             }

@@ -12,10 +12,10 @@
 //! | an encoder that jumps further than the following error allows | 4 samples | three samples beyond a limit, and one to answer |
 //! | every attempt to send feedback fails for up to 2 samples; what the controller receives is unreadable for as long; a node babbles | the same as without it | frames wait and are repeated: even after 32 attempts (bus-off of the drives) and 1.4 ms of recovery the next feedback is there within 5 samples |
 //! | every attempt to send commands fails for up to 2 samples; what the drives receive is unreadable; the wires are held | the same, or the arm stops for a bus-off | as before, unless 32 attempts have failed |
-//! | the same for 9 samples or more | 8 samples | nothing gets through: the drives switch off as if it were lost |
+//! | any of these but babbling for 9 samples or more | 8 samples | nothing gets through: the drives switch off as if it were lost |
 //! | nobody acknowledges feedback for 9 samples or more | 8 samples | after 16 attempts the drives are passive, and the same frame comes again and again: three repeated frames |
 //! | nobody acknowledges commands for 9 samples or more | 9 samples | one more command gets through once the controller is passive; it is repeated, and keeps all later ones waiting |
-//! | a node babbles, or the wires are held, for 9 samples or more | 8 samples | nothing gets through |
+//! | a node babbles for 9 samples or more | 8 samples | nothing gets through |
 //! | drives or controller without power for 9 samples or more | 8 samples | as if they were silent: they start with torque off |
 //! | a drive without power for 2 samples or more | 4 samples | the next feedback says so, and one sample to answer |
 //! | the clock of the drives stands still for 9 samples or more | 8 samples | no feedback, so no commands: the drives let go by a clock of their own |
@@ -227,4 +227,54 @@ pub(super) fn stops_under_control(cause: Cause) -> bool {
             | Cause::EStop
             | Cause::Overload
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What ends well, and what is a false alarm, by what was reported.
+    #[test]
+    fn a_bus_off_is_told_as_such_or_survived() {
+        let own = Expected::SurvivedOr(Cause::BusOff);
+        for (expected, survived, reported, allowed) in [
+            (own, true, None, true),
+            (own, false, Some(Cause::BusOff), true),
+            (own, false, Some(Cause::DriveFault), false),
+            (own, false, None, false),
+            (Expected::Survived, false, Some(Cause::BusOff), false),
+            (Expected::Survived, true, None, true),
+            (Expected::Either, false, None, true),
+        ] {
+            let is = expected.allows(survived, reported);
+            assert_eq!(is, allowed, "{expected:?} {survived} {reported:?}");
+        }
+    }
+
+    #[test]
+    fn of_faults_together_the_hardest_counts() {
+        let period = Period::of_rate(1000.0);
+        let spell = |text: &str, ms: f64| {
+            let fault: crate::faults::Fault = text.parse().unwrap();
+            Spell {
+                what: fault.what,
+                from: Instant::ORIGIN,
+                until: Instant::ORIGIN + Duration::from_seconds(ms * 1e-3),
+            }
+        };
+        let sent = spell("command:bit-error@0s", 2.0);
+        let heard = spell("feedback:bit-error@0s", 2.0);
+        let long = spell("feedback:loss@0s", 60.0);
+        let both = |a: Spell, b: Spell| [expected(&[a, b], period), expected(&[b, a], period)];
+        assert_eq!(
+            expected(&[sent], period),
+            Expected::SurvivedOr(Cause::BusOff)
+        );
+        assert_eq!(expected(&[heard], period), Expected::Survived);
+        assert_eq!(both(sent, heard), [Expected::SurvivedOr(Cause::BusOff); 2]);
+        assert!(matches!(
+            both(sent, long),
+            [Expected::DetectedBy(_), Expected::DetectedBy(_)]
+        ));
+    }
 }

@@ -1,7 +1,7 @@
 //! How warm the motors get if a cycle goes on as planned, and what the controller makes of that.
 
 use firmware::control::fault::OVERLOAD_PERCENT;
-use firmware::control::heat::pace;
+use firmware::control::heat::{LEAST_PACE, WARM, pace};
 use firmware::mechanics::body::Body;
 use firmware::mechanics::kinematics::Trig;
 use firmware::trajectory::Reference;
@@ -11,8 +11,6 @@ use crate::maths::ln;
 use crate::metrics::time_constant;
 use crate::model::AXES;
 
-/// Least pace for want of cooling, as the controller has it.
-const LEAST_PACE: f64 = 0.3;
 /// Heat that is foreseen only roughly: a stop is said to be certain where it is passed by this factor.
 const CERTAIN: f64 = 1.1;
 
@@ -73,20 +71,25 @@ impl Cycle {
 
     /// The pace at which it goes on for ever, and the heat of the motors then.
     fn settled(&self) -> (f64, [f64; 4]) {
-        let paces = (30..=100).rev().map(|percent| f64::from(percent) * 0.01);
+        let paces = (0..=100).rev().map(|percent| f64::from(percent) * 0.01);
+        let least = f64::from(LEAST_PACE);
+        let paces = paces.take_while(|pace| *pace > least);
         let kept = |&at: &f64| f64::from(pace(greatest(&self.for_ever(at)).1 as f32)) >= at;
-        let at = paces.into_iter().find(kept).unwrap_or(LEAST_PACE);
+        let at = paces.into_iter().find(kept).unwrap_or(least);
         (at, self.for_ever(at))
     }
 
     /// What is to be said of `cycles` of them, `period` s a sample: a warning, or why they end.
     pub(super) fn foresee(&self, cycles: u32, period: f64) -> Option<Result<String, String>> {
         let (axis, heat) = greatest(&self.for_ever(1.0));
-        let warm = first_below_full();
+        let warm = f64::from(WARM);
+        if heat <= warm {
+            return None;
+        }
         let cycle_s = (self.moving + self.resting) * period;
         let after = time_constant() * -ln(1.0 - warm / heat);
         let lasts = cycle_s * f64::from(cycles);
-        if heat <= warm || after >= lasts {
+        if after >= lasts {
             return None;
         }
         let mut text = format!(
@@ -140,14 +143,6 @@ impl Cycle {
         }
         Some(longest)
     }
-}
-
-/// Heat from which on moves begin more slowly, by the controller's own account.
-fn first_below_full() -> f64 {
-    let mut percents = (0..=100).map(|percent| f64::from(percent) * 0.01);
-    percents
-        .find(|heat| pace(*heat as f32) < 1.0)
-        .map_or(1.0, |heat| heat - 0.01)
 }
 
 fn greatest(shares: &[f64; 4]) -> (&'static str, f64) {

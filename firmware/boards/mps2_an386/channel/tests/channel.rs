@@ -53,6 +53,9 @@ proptest! {
         let now = Instant::from_nanos(now);
         let request = Request::Poll { now, frame };
         prop_assert_eq!(Request::from_bytes(&request.to_bytes()), Some(request));
+        for request in [Request::BusOff, Request::Stack] {
+            prop_assert_eq!(Request::from_bytes(&request.to_bytes()), Some(request));
+        }
     }
 
     #[test]

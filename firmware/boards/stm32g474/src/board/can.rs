@@ -146,7 +146,9 @@ pub(crate) struct Port {
     estop: bool,
     /// The emergency-stop chain has opened, and the node has not been notified yet.
     estop_due: bool,
+    /// As last seen, and whether that has begun since [`Self::has_gone_off`].
     offline: bool,
+    went_off: bool,
 }
 
 impl Port {
@@ -157,6 +159,7 @@ impl Port {
             estop: false,
             estop_due: false,
             offline: false,
+            went_off: false,
         }
     }
 
@@ -173,15 +176,22 @@ impl Port {
         self.estop_due = pressed;
     }
 
+    /// Whether the node is bus-off now.
+    fn is_offline(&mut self) -> bool {
+        let mode = self.can.driver.properties().bus_error_mode();
+        let offline = matches!(mode, BusErrorMode::BusOff);
+        if offline != self.offline {
+            self.offline = offline;
+            self.went_off |= offline;
+            defmt::warn!("bus-off: {}", offline);
+        }
+        offline
+    }
+
     /// Whether the node has gone bus-off since the last call. A recovery takes 1.4 ms, so that a call every millisecond misses none.
     pub(crate) fn has_gone_off(&mut self) -> bool {
-        let mode = self.can.driver.properties().bus_error_mode();
-        let was_offline = self.offline;
-        self.offline = matches!(mode, BusErrorMode::BusOff);
-        if self.offline != was_offline {
-            defmt::warn!("bus-off: {}", self.offline);
-        }
-        self.offline && !was_offline
+        self.is_offline();
+        core::mem::take(&mut self.went_off)
     }
 
     /// Whether a frame is waiting.
@@ -211,7 +221,7 @@ impl Bus for Port {
 
 impl Transmit for Port {
     fn transmit(&mut self, frame: &CanFrame) -> Result<(), TransmitError> {
-        if self.offline {
+        if self.is_offline() {
             return Err(TransmitError::Offline);
         }
         let frame = to_driver(frame).ok_or(TransmitError::QueueFull)?;
