@@ -37,13 +37,13 @@ fn an_obstacle_is_felt_with_every_law() {
         "computed-torque:observer",
         "computed-torque-task:observer",
     ] {
-        for fault in ["payload:caught=20000@0.4s", "payload:caught=50000@0.45s"] {
+        for fault in ["payload:caught=20000@0.41s", "payload:caught=50000@0.45s"] {
             let (summary, record) = gate(law, fault);
             assert!(!summary.completed && summary.at_rest, "{law}, {fault}");
             let first = &summary.faults[0];
             assert_eq!(first.cause, Cause::Collision.name(), "{law}, {fault}");
             // As soon as it pulls with half of a limit.
-            let begin = if fault.ends_with("0.4s") { 0.4 } else { 0.45 };
+            let begin = if fault.ends_with("0.41s") { 0.41 } else { 0.45 };
             assert!(first.time_s < begin + 0.08, "{law}: {}", first.time_s);
             // The brake's time, and no more.
             let off = first.time_s + 0.1;
