@@ -64,7 +64,7 @@ const CASES: [(&str, Cause); 10] = [
     ("encoder:elbow:reversed@0.4s", Cause::EncoderFault),
     ("motor:elbow:dead@0.4s", Cause::FollowingError),
     ("motor:shoulder:runaway@0.4s", Cause::FollowingError),
-    ("motor:lift:dead@0.4s", Cause::FollowingError),
+    ("motor:lift:dead@0.41s", Cause::FollowingError),
     ("encoder:elbow:bit=18@0.4s", Cause::EncoderFault),
 ];
 

@@ -264,7 +264,7 @@ fn a_payload_is_carried_when_the_controller_has_accepted_it() {
     live(&mut run, &mut seen, 0.3);
     let before = weight(&seen);
     run.order(Order::Carry(PayloadSpec::compact(10.0)));
-    live(&mut run, &mut seen, 1.0);
+    live(&mut run, &mut seen, 1.5);
     let carried = weight(&seen) - before;
     // The scenario itself carries 2 kg.
     assert!((carried - 8.0 * 9.81).abs() < 2.0, "{carried} N");
