@@ -19,7 +19,6 @@ use protocol::messages::{
     Cause, Command, DriveStatus, Fault, Feedback, Message, Mode, Motion, MotionRequest, NmtCommand,
     Node as Name, ParameterReply, Refusal, RefusalReason, ResetReason, Server,
 };
-use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use crate::control::controller::{Config, Controller};
@@ -61,8 +60,8 @@ pub struct Node {
     newest: Option<(u32, Instant)>,
     /// Number of samples answered.
     samples: u32,
-    /// Message table of the operator, once it has greeted.
-    schema: Option<u32>,
+    /// Whether the operator was built from the same message table, once it has greeted.
+    same_schema: Option<bool>,
     overruns: u16,
     /// Samples in a row that took too long, and the number of the last one.
     overruns_in_a_row: u8,
@@ -95,7 +94,7 @@ impl Node {
             strangers: 0,
             newest: None,
             samples: 0,
-            schema: None,
+            same_schema: None,
             overruns: 0,
             overruns_in_a_row: 0,
             overrun: 0,
@@ -264,7 +263,7 @@ impl Node {
         }
         self.strangers = 0;
         if self.controller.mode() == Mode::PreOperational
-            && self.schema == Some(table::HASH)
+            && self.same_schema == Some(true)
             && feedback.status.contains(DriveStatus::ENCODER_VALID)
         {
             self.controller.event(Event::PeerReady);
@@ -309,7 +308,7 @@ impl Node {
         if edge && verdict == Verdict::Initial {
             self.controller
                 .refuse(motion.sequence, Refusal::because(RefusalReason::WrongState));
-        } else if edge && self.schema.is_some_and(|schema| schema != table::HASH) {
+        } else if edge && self.same_schema == Some(false) {
             self.controller.refuse(
                 motion.sequence,
                 Refusal::because(RefusalReason::SchemaMismatch),

@@ -33,7 +33,7 @@ impl Node {
         };
         let reply = match *request {
             ParameterRequest::Hello(peer) => {
-                self.schema = Some(peer.schema);
+                self.same_schema = Some(peer.schema == table::HASH);
                 ParameterReply::Hello(table::HELLO)
             }
             // The first frame of an operator may be a replay: it must not change anything.

@@ -154,7 +154,7 @@ impl Node {
             self.drives.forget();
             self.operator.forget();
             self.drives_parameter.reset();
-            self.schema = None;
+            self.same_schema = None;
         }
     }
 }

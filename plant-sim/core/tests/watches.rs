@@ -164,7 +164,8 @@ fn a_loop_that_swings_is_stopped() {
                     let (summary, record) = run_of(scenario("gate", rate, law), &[&fault], 5);
                     let told = summary.faults.first();
                     let swings = swings(&record, told.map_or(f64::MAX, |it| it.time_s));
-                    assert!(swings <= 20, "{law} at {rate} Hz, {fault}: {swings}");
+                    // 0.2 s of 8 ms each.
+                    assert!(swings <= 25, "{law} at {rate} Hz, {fault}: {swings}");
                     chatters += u32::from(told.is_some_and(|it| it.cause == "chatter"));
                 }
             }

@@ -19,9 +19,8 @@ pub struct MomentumObserver {
     previous_torque: Vector4<f32>,
     /// Friction that the laws counted with in the last sample, and in the one before.
     friction: [Vector4<f32>; 2],
-    /// What a law with a corner below the least gets, and what of it is not a share of the residual.
+    /// What a law with a corner below the least gets.
     slow: Vector4<f32>,
-    rest: Vector4<f32>,
     started: bool,
 }
 
@@ -34,7 +33,6 @@ impl MomentumObserver {
             previous_torque: Vector4::zeros(),
             friction: [Vector4::zeros(); 2],
             slow: Vector4::zeros(),
-            rest: Vector4::zeros(),
             started: false,
         }
     }
@@ -84,19 +82,19 @@ impl MomentumObserver {
         let is_slow = corner < least;
         let own = if is_slow { least } else { corner };
         let own = if own < greatest { own } else { greatest };
+        let before = self.residual;
         self.residual = (momentum - self.expected) * own;
         if is_slow {
-            self.filter(corner / own, corner * motion.elapsed);
+            self.filter(&before, corner / own, corner * motion.elapsed);
         }
     }
 
-    /// The low-pass with a lower corner of what the residual is the low-pass of: with r that one and s the slow one, a share
-    /// a = corner / own of r and a rest with rest' = corner (r - s).
+    /// The low-pass with a lower corner of what the residual is the low-pass of: with r that one, `before` a sample ago, and s the slow one,
+    /// s' = r' corner / own + corner (r - s).
     // Out of line: not with the gains that most will have.
     #[inline(never)]
-    fn filter(&mut self, share: f32, angle: f32) {
-        self.slow = self.rest + self.residual * share;
-        self.rest += (self.residual - self.slow) * angle;
+    fn filter(&mut self, before: &Vector4<f32>, share: f32, angle: f32) {
+        self.slow += (self.residual - before) * share + (before - self.slow) * angle;
     }
 }
 
