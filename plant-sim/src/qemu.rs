@@ -5,6 +5,7 @@
 //! that; the message has its time.
 
 mod board;
+mod costs;
 mod image;
 mod log;
 mod serial;
@@ -18,9 +19,9 @@ use std::rc::Rc;
 pub use channel::Channel;
 use channel::ring::CAPACITY;
 use channel::{Fault, Request, Setup};
+pub use costs::{Costs, Poll};
 use firmware::cabinet::reset::Stop;
 use firmware::control::controller::Config;
-use firmware::control::phase::Phase;
 pub use image::image;
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
@@ -56,28 +57,6 @@ pub struct Options {
 const AHEAD: usize = 64;
 /// The same over the UART: as many lines as its receiver holds.
 const LINES_AHEAD: usize = CAPACITY / MAX_LINE;
-
-/// Cost of a run on the board.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Costs {
-    /// Every call of the node.
-    pub polls: Vec<Poll>,
-    /// Most stack used, bytes.
-    pub stack: u32,
-}
-
-/// Cost of one call of the node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Poll {
-    /// Instructions from frame in to frames out.
-    pub instructions: u32,
-    /// Instructions of each phase; zeros from an image that does not measure phases.
-    pub phases: [u32; Phase::ALL.len()],
-    /// Identifier of the frame received, if any.
-    pub received: Option<u32>,
-    /// Whether a move was being planned.
-    pub planning: bool,
-}
 
 /// The image for runs.
 pub const IMAGE: &str = "mps2-an386";
