@@ -56,7 +56,7 @@ const TWINS: [(&str, &[&str], &[&str]); 19] = [
     (
         "bus-off",
         &["faults=[\"command:bit-error@0.4s..0.406s\", \"controller:no-recovery@0s\"]"],
-        &["noticed", "reported"],
+        &["reported", "rest"],
     ),
     // Too few errors for bus-off.
     (

@@ -143,6 +143,8 @@ impl RunConfig {
             damping,
             observer,
         };
+        // Those that are refused for themselves need no advice.
+        gains.check(self.period(), 0.0, false).ok()?;
         let (axis, share) = self.step(&gains);
         let most = f64::from(Gains::ENCODER_STEP);
         // What the controller lowers by itself ends next to it.
