@@ -9,6 +9,7 @@
 )]
 
 mod bench;
+mod beyond;
 mod faults;
 mod gains;
 mod manual;
