@@ -44,11 +44,10 @@ fn heat_follows_the_square_of_the_effort() {
             } else {
                 (1.0 - left(100)) * left(step - 100)
             };
-            for joint in 0..4 {
-                let (found, expected) =
-                    (f64::from(heat.shares()[joint]), squares[joint] * response);
+            for (found, square) in heat.shares().iter().zip(squares) {
+                let (found, expected) = (f64::from(*found), square * response);
                 assert!(
-                    (found - expected).abs() <= 1e-4 * squares[joint],
+                    (found - expected).abs() <= 1e-4 * square,
                     "{step}: {found} {expected}"
                 );
             }
