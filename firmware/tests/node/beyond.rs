@@ -74,7 +74,10 @@ fn manual_operation_frees_no_arm_that_goes_further() {
                 Some(Outcome::Accepted)
             );
             go(&mut bench, target.into());
-            while bench.mode() == Mode::Moving {
+            for _ in 0..3000 {
+                if bench.mode() != Mode::Moving {
+                    break;
+                }
                 let frame = bench.motion(MotionRequest::Hold);
                 bench.wire.to_node.push_back(frame);
                 let way = (here(&bench) - begin).amax();

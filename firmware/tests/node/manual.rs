@@ -351,7 +351,7 @@ fn a_hold_lasts_as_long_as_it_says() {
         let mut released = held.clone();
         // Both are held now, and one of them from then on.
         let mut alike = 0;
-        for sample in 0.. {
+        for sample in 0..1000 {
             for (bench, is_held) in [(&mut held, true), (&mut released, sample == 0)] {
                 if is_held {
                     let frame = bench.motion(MotionRequest::Hold);
