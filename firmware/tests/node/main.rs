@@ -20,6 +20,7 @@ mod reports;
 mod requests;
 mod shell;
 mod stops;
+mod strain;
 mod switching;
 mod wire;
 

@@ -1,0 +1,153 @@
+//! What follows where an axis needs more torque than there is.
+
+use firmware::control::controller::Config;
+use firmware::mechanics::arm::IRB_930;
+use nalgebra::Vector4;
+use protocol::messages::{Cause, FaultAxis, Mode, MotionRequest, Outcome};
+use protocol::time::Period;
+
+use crate::bench::{Bench, by_itself};
+
+/// An arm that falls behind, or gets ahead, of its reference a little more in every sample, until a torque is cut: a move is slowed down by
+/// the square root of what is missing, which is little. At once where the arm is to be faster; a braking one would need even more
+/// torque for that, so only what comes after it is slower.
+#[test]
+fn a_move_that_needs_a_little_too_much_torque_is_a_little_slower() {
+    // It turns in negative direction.
+    for (side, at_once) in [(1.0, true), (-1.0, false)] {
+        let mut bench = Bench::moving();
+        let limit = IRB_930.drive.motor_torque_limit.x;
+        let mut is_cut = false;
+        for _ in 0..200 {
+            bench.off.x += side * 5e-5;
+            if bench.command().torque[0].abs() >= limit {
+                is_cut = true;
+                break;
+            }
+            assert_eq!(bench.node.controller().pace(), 1.0, "{side}");
+        }
+        assert!(is_cut && bench.mode() == Mode::Moving, "{side}");
+        for _ in 0..20 {
+            bench.off.x *= 0.8;
+            bench.step();
+        }
+        let slow = 0.95..0.99;
+        let now = bench.node.controller().pace();
+        assert_eq!(
+            (slow.contains(&now), now == 1.0),
+            (at_once, !at_once),
+            "{side}: {now}"
+        );
+        bench.run(1000);
+        assert_eq!(
+            (bench.mode(), bench.node.controller().cause()),
+            (Mode::Enabled, Cause::None)
+        );
+        let then = bench.node.controller().pace();
+        assert!(slow.contains(&then), "{side}: {then}");
+    }
+}
+
+/// One that stands would start, which it may do later: whatever it lacks, the move of the others goes on at its pace.
+#[test]
+fn an_axis_that_stands_slows_down_no_move_under_way() {
+    let mut bench = Bench::with(by_itself());
+    bench.enable();
+    bench.follows = true;
+    let wrist = MotionRequest::MoveJoint {
+        target: [0.2, 1.5, 0.15, 3.0],
+        speed: 0.2,
+    };
+    assert_eq!(bench.request(wrist), Some(Outcome::Accepted));
+    assert_eq!(bench.mode(), Mode::Moving);
+    let limit = IRB_930.drive.motor_torque_limit.x;
+    while bench.command().torque[0].abs() < limit && bench.off.x < 0.1 {
+        bench.off.x += 2e-4;
+    }
+    bench.off.x = 0.0;
+    bench.run(20);
+    let controller = bench.node.controller();
+    assert_eq!((controller.mode(), controller.pace()), (Mode::Moving, 1.0));
+    bench.run(1000);
+    let controller = bench.node.controller();
+    assert_eq!(
+        (controller.mode(), controller.cause()),
+        (Mode::Enabled, Cause::None)
+    );
+    assert!(
+        (0.9..0.99).contains(&controller.pace()),
+        "{}",
+        controller.pace()
+    );
+}
+
+/// Nor does an arm that is pushed where it holds, slow down what it is to do after that.
+#[test]
+fn an_arm_at_rest_slows_down_nothing() {
+    let mut bench = Bench::enabled();
+    bench.shove(0.01);
+    assert_eq!(
+        bench.command().torque[1],
+        -IRB_930.drive.motor_torque_limit.y
+    );
+    bench.shove(-0.01);
+    bench.run(100);
+    let controller = bench.node.controller();
+    assert_eq!((controller.mode(), controller.pace()), (Mode::Enabled, 1.0));
+}
+
+/// An axis at its torque limit whose encoder does not move: 2.2 ms and two samples at the least where it is more than 5 % of its
+/// following error off, eight times that where it is not.
+#[test]
+fn an_encoder_that_does_not_move_under_full_torque_is_stuck() {
+    for (following, rate, off, samples) in [
+        (0.05, 500.0, 0.04f32, 2),
+        (0.05, 1000.0, 0.01, 3),
+        (0.05, 2000.0, 0.01, 5),
+        (1.0, 500.0, 0.04, 16),
+        (1.0, 1000.0, 0.01, 18),
+        (1.0, 2000.0, 0.01, 36),
+    ] {
+        let mut config = Config::new(IRB_930, Period::of_rate(rate));
+        config.setup.monitor.following_error = Vector4::repeat(following);
+        config.setup.monitor.collision = f32::MAX;
+        let mut bench = Bench::with(config);
+        bench.enable();
+        assert_eq!(bench.mode(), Mode::Enabled);
+        bench.shove(off.into());
+        for sample in 1..=samples {
+            assert_eq!(bench.mode(), Mode::Enabled, "{following} {rate}: {sample}");
+            bench.step();
+        }
+        let fault = *bench.node.controller().fault();
+        assert_eq!(
+            (fault.cause, fault.axis),
+            (Cause::StuckSensor, FaultAxis::Elbow),
+            "{following} {rate}: {fault}"
+        );
+        assert!(
+            (fault.value + off).abs() < 1e-5 && (fault.limit - 0.05 * following).abs() < 1e-6,
+            "{fault:?}"
+        );
+    }
+}
+
+/// Where the brake holds it, it is not stuck.
+#[test]
+fn an_encoder_that_does_not_move_under_the_brake_is_sound() {
+    let mut bench = Bench::enabled();
+    let disable = bench.motion(MotionRequest::Disable);
+    bench.wire.to_node.push_back(disable);
+    bench.step();
+    bench.shove(0.01);
+    let mut samples = 0;
+    while bench.mode() == Mode::Disabling && samples < 1000 {
+        bench.step();
+        samples += 1;
+    }
+    assert!((30..300).contains(&samples), "{samples}");
+    assert_eq!(
+        (bench.mode(), bench.node.controller().cause()),
+        (Mode::Ready, Cause::None)
+    );
+}
