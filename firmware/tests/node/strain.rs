@@ -3,17 +3,18 @@
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
 use nalgebra::Vector4;
-use protocol::messages::{Cause, FaultAxis, Mode, MotionRequest, Outcome};
+use protocol::messages::{Cause, FaultAxis, LimitFlags, Message, Mode, MotionRequest, Outcome};
 use protocol::time::Period;
 
-use crate::bench::{Bench, by_itself};
+use crate::bench::{Bench, PERIOD, by_itself};
+use crate::faults::states;
 
 /// An arm that falls behind, or gets ahead, of its reference a little more in every sample, until a torque is cut: a move is slowed down by
 /// the square root of what is missing, which is little. At once where the arm is to be faster; a braking one would need even more
 /// torque for that, so only what comes after it is slower.
 #[test]
 fn a_move_that_needs_a_little_too_much_torque_is_a_little_slower() {
-    // It turns in negative direction.
+    // It sides in negative direction.
     for (side, at_once) in [(1.0, true), (-1.0, false)] {
         let mut bench = Bench::moving();
         let limit = IRB_930.drive.motor_torque_limit.x;
@@ -101,7 +102,8 @@ fn an_arm_at_rest_slows_down_nothing() {
 #[test]
 fn an_encoder_that_does_not_move_under_full_torque_is_stuck() {
     for (following, rate, off, samples) in [
-        (0.05, 500.0, 0.04f32, 2),
+        (1.0, 250.0, 0.2f32, 2),
+        (0.05, 500.0, 0.04, 2),
         (0.05, 1000.0, 0.01, 3),
         (0.05, 2000.0, 0.01, 5),
         (1.0, 500.0, 0.04, 16),
@@ -149,5 +151,54 @@ fn an_encoder_that_does_not_move_under_the_brake_is_sound() {
     assert_eq!(
         (bench.mode(), bench.node.controller().cause()),
         (Mode::Ready, Cause::None)
+    );
+}
+
+/// Long before the mean over some looks would show it.
+#[test]
+fn a_torque_from_limit_to_limit_and_back_is_chatter_at_the_fifth_turn() {
+    let mut bench = Bench::enabled();
+    // Not an encoder that stands.
+    bench.velocity[1] = 5.0;
+    let limit = IRB_930.drive.motor_torque_limit.y;
+    bench.shove(0.01);
+    let mut sides = 0;
+    while bench.command().torque[1].abs() >= limit && sides < 20 {
+        sides += 1;
+        bench.shove(if sides % 2 == 0 { 0.02 } else { -0.02 });
+    }
+    let fault = *bench.node.controller().fault();
+    assert_eq!(
+        (fault.cause, fault.axis, fault.value, fault.limit),
+        (Cause::Chatter, FaultAxis::Elbow, 400.0, 80.0),
+        "{fault}"
+    );
+    assert_eq!(sides, 6);
+}
+
+/// The torque that the elbow may have for ever warms it up to all of it. From 90 % on moves are slower, and the state says so.
+#[test]
+fn a_warm_motor_is_reported() {
+    let mut config = Config::new(IRB_930, PERIOD);
+    config.setup.thermal_time = 0.5;
+    let mut bench = Bench::with(config);
+    bench.enable();
+    let last = |sent: &[Message]| *states(sent).last().unwrap();
+    assert_eq!(last(&bench.run(100)).limits, LimitFlags::EMPTY);
+    let (limits, drive) = (&IRB_930.limits, &IRB_930.drive);
+    let wanted = limits.effort_continuous.y / drive.gear_ratio.y;
+    bench.shove(1e-3);
+    let found = bench.command().torque[1].abs();
+    bench.shove(1e-3 * f64::from(wanted / found - 1.0));
+    assert!((bench.command().torque[1].abs() - wanted).abs() < 0.01 * wanted);
+    // Half of the time constant, and four.
+    let warm = last(&bench.run(250));
+    assert_eq!((warm.limits, warm.pace), (LimitFlags::EMPTY, 100));
+    let hot = last(&bench.run(1750));
+    assert_eq!(hot.limits, LimitFlags::WARM);
+    assert!((30..50).contains(&hot.pace), "{}", hot.pace);
+    assert_eq!(
+        (bench.mode(), bench.node.controller().cause()),
+        (Mode::Enabled, Cause::None)
     );
 }
