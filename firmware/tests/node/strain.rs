@@ -14,7 +14,7 @@ use crate::faults::states;
 /// torque for that, so only what comes after it is slower.
 #[test]
 fn a_move_that_needs_a_little_too_much_torque_is_a_little_slower() {
-    // It sides in negative direction.
+    // It turns in negative direction.
     for (side, at_once) in [(1.0, true), (-1.0, false)] {
         let mut bench = Bench::moving();
         let limit = IRB_930.drive.motor_torque_limit.x;
