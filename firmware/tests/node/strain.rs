@@ -8,6 +8,7 @@ use protocol::time::Period;
 
 use crate::bench::{Bench, PERIOD, by_itself};
 use crate::faults::states;
+use crate::manual::here;
 
 /// An arm that falls behind, or gets ahead, of its reference a little more in every sample, until a torque is cut: a move is slowed down by
 /// the square root of what is missing, which is little. At once where the arm is to be faster; a braking one would need even more
@@ -55,16 +56,17 @@ fn an_axis_that_stands_slows_down_no_move_under_way() {
     let mut bench = Bench::with(by_itself());
     bench.enable();
     bench.follows = true;
-    let wrist = MotionRequest::MoveJoint {
-        target: [0.2, 1.5, 0.15, 3.0],
-        speed: 0.2,
-    };
+    // From where it is to the last bit, so that the others stand.
+    let mut target: [f32; 4] = here(&bench).into();
+    target[3] = 3.0;
+    let wrist = MotionRequest::MoveJoint { target, speed: 0.2 };
     assert_eq!(bench.request(wrist), Some(Outcome::Accepted));
     assert_eq!(bench.mode(), Mode::Moving);
     let limit = IRB_930.drive.motor_torque_limit.x;
     while bench.command().torque[0].abs() < limit && bench.off.x < 0.1 {
         bench.off.x += 2e-4;
     }
+    assert_eq!(bench.node.controller().reference().qd.x, 0.0);
     bench.off.x = 0.0;
     bench.run(20);
     let controller = bench.node.controller();
