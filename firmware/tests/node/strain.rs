@@ -204,3 +204,30 @@ fn a_warm_motor_is_reported() {
         (Mode::Enabled, Cause::None)
     );
 }
+
+/// Full torque for 200 ms of an axis that hardly moves, below a tenth of its speed. One that moves is on its way.
+#[test]
+fn full_torque_is_too_much_where_an_axis_hardly_moves() {
+    for (share, expected) in [
+        (0.01, Cause::OverTorque),
+        (0.09, Cause::OverTorque),
+        (0.11, Cause::None),
+        (0.5, Cause::None),
+    ] {
+        let mut bench = Bench::with(by_itself());
+        bench.enable();
+        let full = IRB_930
+            .limits
+            .velocity
+            .component_mul(&IRB_930.drive.gear_ratio);
+        // The shoulder, whose torque is at its limit as well, is on its way.
+        (bench.velocity[0], bench.velocity[1]) = (0.2 * full.x, share * full.y);
+        bench.shove(0.007);
+        bench.run(199);
+        let early = bench.node.controller().fault();
+        assert_eq!(bench.mode(), Mode::Enabled, "{share}: {early}");
+        bench.run(10);
+        let fault = *bench.node.controller().fault();
+        assert_eq!(fault.cause, expected, "{share}: {fault}");
+    }
+}
