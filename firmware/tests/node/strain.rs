@@ -53,38 +53,40 @@ fn a_move_that_needs_a_little_too_much_torque_is_a_little_slower() {
 /// One that stands would start, which it may do later: whatever it lacks, the move of the others goes on at its pace.
 #[test]
 fn an_axis_that_stands_slows_down_no_move_under_way() {
-    let mut bench = Bench::with(by_itself());
-    bench.enable();
-    bench.follows = true;
-    // From where it is to the last bit, so that the others stand.
-    let mut target: [f32; 4] = here(&bench).into();
-    target[3] = 3.0;
-    let wrist = MotionRequest::MoveJoint { target, speed: 0.2 };
-    assert_eq!(bench.request(wrist), Some(Outcome::Accepted));
-    assert_eq!(bench.mode(), Mode::Moving);
-    let limit = IRB_930.drive.motor_torque_limit.x;
-    while bench.command().torque[0].abs() < limit && bench.off.x < 0.1 {
-        bench.off.x += 2e-4;
+    for side in [1.0, -1.0] {
+        let mut bench = Bench::with(by_itself());
+        bench.enable();
+        bench.follows = true;
+        // From where it is to the last bit, so that the others stand.
+        let mut target: [f32; 4] = here(&bench).into();
+        target[3] = 3.0;
+        let wrist = MotionRequest::MoveJoint { target, speed: 0.2 };
+        assert_eq!(bench.request(wrist), Some(Outcome::Accepted));
+        assert_eq!(bench.mode(), Mode::Moving);
+        let limit = IRB_930.drive.motor_torque_limit.x;
+        while bench.command().torque[0].abs() < limit && bench.off.x.abs() < 0.1 {
+            bench.off.x += side * 2e-4;
+        }
+        assert_eq!(bench.node.controller().reference().qd.x, 0.0);
+        bench.off.x = 0.0;
+        bench.run(20);
+        let controller = bench.node.controller();
+        assert_eq!((controller.mode(), controller.pace()), (Mode::Moving, 1.0));
+        bench.run(1000);
+        let controller = bench.node.controller();
+        assert_eq!(
+            (controller.mode(), controller.cause()),
+            (Mode::Enabled, Cause::None)
+        );
+        assert!(
+            (0.9..0.99).contains(&controller.pace()),
+            "{}",
+            controller.pace()
+        );
     }
-    assert_eq!(bench.node.controller().reference().qd.x, 0.0);
-    bench.off.x = 0.0;
-    bench.run(20);
-    let controller = bench.node.controller();
-    assert_eq!((controller.mode(), controller.pace()), (Mode::Moving, 1.0));
-    bench.run(1000);
-    let controller = bench.node.controller();
-    assert_eq!(
-        (controller.mode(), controller.cause()),
-        (Mode::Enabled, Cause::None)
-    );
-    assert!(
-        (0.9..0.99).contains(&controller.pace()),
-        "{}",
-        controller.pace()
-    );
 }
 
-/// Nor does an arm that is pushed where it holds, slow down what it is to do after that.
+/// Nor does an arm that is pushed where it holds slow down what it is to do after that.
 #[test]
 fn an_arm_at_rest_slows_down_nothing() {
     let mut bench = Bench::enabled();
