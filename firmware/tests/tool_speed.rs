@@ -15,7 +15,7 @@ use firmware::mechanics::arm::ArmModel;
 use firmware::mechanics::kinematics::{self, Elbow, Pose};
 use firmware::trajectory::planner::Planner;
 use firmware::trajectory::request::Target;
-use firmware::trajectory::tool_speed::{PLANNED, REACH};
+use firmware::trajectory::tool_speed::{self, PLANNED, REACH};
 use firmware::trajectory::{Reference, Trajectory};
 use nalgebra::Vector4;
 use proptest::prelude::*;
@@ -130,5 +130,20 @@ fn the_stretched_arm_counts_where_it_is_passed() {
             found <= limit() && found > 0.6 * limit(),
             "{from} {to}: {found}"
         );
+    }
+}
+
+/// By hand: 50 mm/s across and a turn of 1 rad/s 100 mm away are 150 mm/s, and 200 mm/s down makes that 250 mm/s.
+#[test]
+fn the_speed_of_the_tool_is_that_of_its_fastest_point() {
+    for (velocity, speed) in [
+        ([0.03, 0.04, 0.0, 0.0], 0.05),
+        ([0.0, 0.0, 0.0, -2.0], 0.2),
+        ([0.03, -0.04, 0.0, 1.0], 0.15),
+        ([-0.03, 0.04, -0.2, -1.0], 0.25),
+        ([0.1, 0.0, 0.0, 3.0], 0.4),
+    ] {
+        let found = tool_speed::of(&Vector4::from(velocity));
+        assert!((found - speed).abs() < 1e-6, "{velocity:?}: {found}");
     }
 }

@@ -40,7 +40,7 @@ impl Transmit for Wire {
     }
 }
 
-/// A node and an arm that stays still whatever the command, unless it `follows`: then it is at the node's reference.
+/// A node and an arm that stays still whatever the command, unless it `follows`: then it is at the node's reference, or `off` it.
 #[derive(Clone)]
 pub(crate) struct Bench {
     pub node: Node,
@@ -57,6 +57,7 @@ pub(crate) struct Bench {
     /// Whether the drives do what the control word says.
     pub obeys: bool,
     pub follows: bool,
+    pub off: Vector4<f32>,
     period: Duration,
     drive: Drive,
 }
@@ -80,6 +81,7 @@ impl Bench {
             status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
             obeys: true,
             follows: false,
+            off: Vector4::zeros(),
             period: config.period.duration(),
             drive: Drive::new(&IRB_930.drive),
         };
@@ -152,7 +154,7 @@ impl Bench {
             let Reference { q, qd, qdd } = *self.node.controller().reference();
             let period = self.period.seconds() as f32;
             let mean = qd + qdd * (0.5 * period);
-            self.put(&(q + mean * period));
+            self.put(&(q + mean * period + self.off));
             self.velocity = self.drive.motor_angle(&mean).into();
         }
         let word = self.node.controller().control_word();

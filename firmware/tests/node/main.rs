@@ -9,6 +9,7 @@
 )]
 
 mod bench;
+mod beyond;
 mod faults;
 mod gains;
 mod manual;
@@ -19,6 +20,7 @@ mod reports;
 mod requests;
 mod shell;
 mod stops;
+mod strain;
 mod switching;
 mod wire;
 

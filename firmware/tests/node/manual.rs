@@ -1,11 +1,12 @@
 //! Manual operation: nothing moves without a hold, and nothing fast.
 
+use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
 use nalgebra::Vector4;
 use protocol::codec::encode;
 use protocol::messages::{
-    Cause, ControlWord, FaultAxis, Message, Mode, Motion, MotionRequest, Operation, Outcome,
-    Posture, Refusal, RefusalReason,
+    Cause, FaultAxis, Message, Mode, Motion, MotionRequest, Operation, Outcome, Posture, Refusal,
+    RefusalReason,
 };
 
 use crate::bench::{Bench, by_itself};
@@ -19,7 +20,11 @@ const FAR: [f32; 4] = [-1.0, 0.5, 0.05, -2.0];
 
 /// Under torque in manual operation, with an arm that follows.
 fn manual() -> Bench {
-    let mut bench = Bench::with(by_itself());
+    manual_with(by_itself())
+}
+
+fn manual_with(config: Config) -> Bench {
+    let mut bench = Bench::with(config);
     bench.enable();
     bench.follows = true;
     assert_eq!(
@@ -29,12 +34,12 @@ fn manual() -> Bench {
     bench
 }
 
-fn set(operation: Operation) -> MotionRequest {
+pub(crate) fn set(operation: Operation) -> MotionRequest {
     MotionRequest::SetOperation { operation }
 }
 
 /// Samples with a hold in every 50th, as long as it goes on.
-fn hold(bench: &mut Bench, samples: usize) -> Vec<Message> {
+pub(crate) fn hold(bench: &mut Bench, samples: usize) -> Vec<Message> {
     let mut sent = Vec::new();
     for sample in 0..samples {
         if sample % 50 == 0 {
@@ -46,12 +51,12 @@ fn hold(bench: &mut Bench, samples: usize) -> Vec<Message> {
     sent
 }
 
-fn go(bench: &mut Bench, target: [f32; 4]) {
+pub(crate) fn go(bench: &mut Bench, target: [f32; 4]) {
     let to = MotionRequest::MoveJoint { target, speed: 1.0 };
     assert_eq!(bench.request(to), Some(Outcome::Accepted));
 }
 
-fn here(bench: &Bench) -> Vector4<f32> {
+pub(crate) fn here(bench: &Bench) -> Vector4<f32> {
     bench.node.controller().reference().q
 }
 
@@ -289,7 +294,7 @@ fn the_operation_changes_only_where_nothing_moves_or_is_about_to() {
     );
 }
 
-/// A stop ends a held move as any other, and holds during it change nothing.
+/// A stop ends a held move as any other, and holds during it change nothing, nor are they refused: who holds cannot know of it yet.
 #[test]
 fn a_stop_ends_a_held_move() {
     let mut bench = manual();
@@ -297,7 +302,11 @@ fn a_stop_ends_a_held_move() {
     hold(&mut bench, 500);
     let frame = bench.motion(MotionRequest::Stop);
     bench.wire.to_node.push_back(frame);
-    hold(&mut bench, 200);
+    let mut sent = bench.step();
+    assert_eq!(bench.mode(), Mode::QuickStop);
+    sent.extend(hold(&mut bench, 200));
+    let refused = |message: &&Message| matches!(message, Message::MotionReply(reply) if reply.outcome != Outcome::Accepted);
+    assert_eq!(sent.iter().find(refused), None);
     assert_eq!(bench.mode(), Mode::Enabled);
     let rest = here(&bench);
     hold(&mut bench, 1000);
@@ -330,39 +339,51 @@ fn a_tool_that_is_too_fast_is_a_fault() {
     }
 }
 
-/// Beyond the limit of the elbow and its margin, 2.531 + 0.02 rad, no torque stays on in automatic operation.
+/// 150 ms: the 150th sample after the last hold is the first in which the arm slows down.
 #[test]
-fn manual_operation_frees_an_arm_from_beyond_a_limit() {
-    let beyond = [0.2, 2.6, 0.15, 0.3f32];
-    for operation in [Operation::Automatic, Operation::Manual] {
-        let mut bench = Bench::with(by_itself());
-        bench.put(&Vector4::from(beyond));
-        bench.hello(protocol::table::HASH);
-        bench.run(2);
-        bench.request(MotionRequest::Stop);
-        assert_eq!(bench.request(set(operation)), Some(Outcome::Accepted));
-        bench.request(MotionRequest::Enable);
-        bench.run(100);
-        if operation == Operation::Automatic {
-            assert_eq!(bench.node.controller().cause(), Cause::SoftLimit);
-            continue;
+fn a_hold_lasts_as_long_as_it_says() {
+    for (time, samples) in [(None, 150), (Some(0.05), 50), (Some(0.7), 700)] {
+        let mut config = by_itself();
+        config.setup.hold_time = time.unwrap_or(config.setup.hold_time);
+        let mut held = manual_with(config);
+        go(&mut held, FAR);
+        hold(&mut held, 201);
+        let mut released = held.clone();
+        // Both are held now, and one of them from then on.
+        let mut alike = 0;
+        for sample in 0..1000 {
+            for (bench, is_held) in [(&mut held, true), (&mut released, sample == 0)] {
+                if is_held {
+                    let frame = bench.motion(MotionRequest::Hold);
+                    bench.wire.to_node.push_back(frame);
+                }
+                bench.step();
+            }
+            let references = [&held, &released].map(|bench| *bench.node.controller().reference());
+            if references[0] != references[1] {
+                break;
+            }
+            alike += 1;
         }
-        assert_eq!(bench.mode(), Mode::Enabled);
-        bench.follows = true;
-        let further = MotionRequest::MoveJoint {
-            target: [0.2, 2.7, 0.15, 0.3],
-            speed: 1.0,
-        };
-        assert_eq!(bench.refusal(further), RefusalReason::JointLimit);
-        let aside = MotionRequest::MoveJoint {
-            target: [0.1, 2.6, 0.15, 0.3],
-            speed: 1.0,
-        };
-        assert_eq!(bench.refusal(aside), RefusalReason::JointLimit);
-        go(&mut bench, [0.2, 2.4, 0.15, 0.3]);
-        hold(&mut bench, 3000);
-        assert_eq!(bench.mode(), Mode::Enabled);
-        assert!((here(&bench).y - 2.4).abs() < 1e-5);
-        assert!(bench.words(1)[0].contains(ControlWord::BRAKE_RELEASE));
+        assert_eq!(alike + 1, samples);
+    }
+}
+
+/// However long it would last.
+#[test]
+fn a_hold_ends_with_the_torque() {
+    let mut config = by_itself();
+    config.setup.hold_time = 10.0;
+    let mut bench = manual_with(config);
+    assert_eq!(bench.request(MotionRequest::Hold), None);
+    let mut bench_off = bench.clone();
+    bench_off.request(MotionRequest::Disable);
+    bench_off.request(MotionRequest::Enable);
+    for (bench, moves) in [(&mut bench, true), (&mut bench_off, false)] {
+        bench.run(100);
+        let start = here(bench);
+        go(bench, FAR);
+        bench.run(1000);
+        assert_eq!((bench.mode(), here(bench) != start), (Mode::Moving, moves));
     }
 }

@@ -11,7 +11,7 @@ use protocol::messages::{
     ParameterRequest, Server,
 };
 use protocol::table::{self, TABLE};
-use protocol::time::Period;
+use protocol::time::{Duration, Period};
 
 use crate::bench::{Bench, PERIOD, SILENCE, heartbeat};
 
@@ -189,6 +189,16 @@ fn an_old_heartbeat_is_none() {
     assert_eq!(bench.node.controller().cause(), Cause::OperatorSilent);
 }
 
+/// Runs a bench with torque on for a second at most, and returns for how many samples.
+fn run_until_it_stops(bench: &mut Bench) -> u32 {
+    let mut samples = 0;
+    while bench.mode() == Mode::Enabled && samples < 1000 {
+        bench.step();
+        samples += 1;
+    }
+    samples
+}
+
 #[test]
 fn the_time_without_a_heartbeat_is_a_parameter() {
     for timeout in [0.15, 0.5] {
@@ -199,13 +209,60 @@ fn the_time_without_a_heartbeat_is_a_parameter() {
         let frame = heartbeat(Name::Operator, Mode::Ready, 0);
         bench.wire.to_node.push_back(frame);
         bench.step();
-        let mut samples = 0;
-        while bench.mode() == Mode::Enabled {
-            bench.step();
-            samples += 1;
-        }
+        let samples = run_until_it_stops(&mut bench);
         let late = f64::from(samples) * 1e-3 - f64::from(timeout);
         assert!((-2.5e-3..12e-3).contains(&late), "{samples} {timeout}");
+    }
+}
+
+/// Silence is more than 250 ms without a heartbeat. It is looked for in every tenth sample: whichever sample the last one came in, the first look
+/// after that finds it.
+#[test]
+fn a_heartbeat_may_be_as_old_as_the_limit_and_no_older() {
+    let age = |phase| {
+        let mut bench = Bench::enabled();
+        bench.run(phase);
+        let frame = heartbeat(Name::Operator, Mode::Ready, 0);
+        bench.wire.to_node.push_back(frame);
+        let heard = bench.sample - 1;
+        run_until_it_stops(&mut bench);
+        let fault = *bench.node.controller().fault();
+        let age = bench.sample - 1 - heard;
+        assert_eq!((fault.cause, fault.limit), (Cause::OperatorSilent, 250.0));
+        assert!((fault.value - age as f32).abs() < 1e-3, "{fault}");
+        age
+    };
+    let mut ages: Vec<_> = (0..10).map(age).collect();
+    ages.sort_unstable();
+    assert_eq!(ages, (251..=260).collect::<Vec<_>>());
+}
+
+/// Feedback as old as the limit, and a little older: the fault says in ms for how long.
+#[test]
+fn feedback_may_be_as_old_as_the_limit_and_no_older() {
+    for (micros, is_silent) in [
+        (99_999, false),
+        (100_000, false),
+        (100_001, true),
+        (350_000, true),
+    ] {
+        let mut bench = Bench::enabled();
+        bench.now += Duration::from_micros(micros);
+        bench.poll();
+        let fault = *bench.node.controller().fault();
+        let expected = if is_silent {
+            Cause::PeerSilent
+        } else {
+            Cause::None
+        };
+        assert_eq!(fault.cause, expected, "{micros}");
+        if is_silent {
+            let ms = micros as f32 * 1e-3;
+            assert!(
+                (fault.value - ms).abs() < 1e-4 * ms && fault.limit == 100.0,
+                "{fault}"
+            );
+        }
     }
 }
 
