@@ -54,6 +54,8 @@ impl LockStep {
     /// Takes the frames that have arrived; those of the controller are compared and passed on.
     fn take(&mut self, now: Instant) -> Result<(), PeerError> {
         while let Some(frame) = self.remote.link.receive() {
+            // Before what the controller makes of it.
+            self.hear_of_bus_off();
             match sender(&frame) {
                 Some(Name::Controller) => self.answer(&frame)?,
                 Some(Name::Drives | Name::Operator) => {
@@ -71,12 +73,16 @@ impl LockStep {
                 }
             }
         }
-        // The controller hears the same of the interface, and only it knows when.
+        self.hear_of_bus_off();
+        Ok(())
+    }
+
+    /// The controller hears the same of the interface, and only it knows when.
+    fn hear_of_bus_off(&mut self) {
         if self.remote.link.take_bus_off() {
             self.follows = false;
             self.twin.bus_off();
         }
-        Ok(())
     }
 
     fn answer(&mut self, frame: &CanFrame) -> Result<(), PeerError> {
