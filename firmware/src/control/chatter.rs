@@ -21,11 +21,12 @@ const MOST: f32 = 2.0;
 /// from that.
 const SHORT: f32 = 1e-3;
 
-/// Times that a torque is cut to one side and then to the other that are a swing, and the time between two cuts below which a plan cannot
-/// be the reason, as a multiple of the time that one takes from no torque to the greatest: it takes twice that time from limit to limit.
-const TURNS: u8 = 5;
 /// Share of swing that stands for a torque that for long changes as fast as that of a plan does at the most.
 const STEEP: f32 = CHATTER_PERCENT as f32 * 1e-2;
+/// Times that a torque is cut to one side and then to the other that are a swing.
+const TURNS: u8 = 5;
+/// Time between two cuts below which a plan cannot be the reason, as a multiple of the time that one takes from no torque to the greatest: it takes
+/// twice that time from limit to limit.
 const SOON: f32 = 2.0;
 
 /// Watches torques for chatter.

@@ -117,6 +117,17 @@ impl Bench {
         bench
     }
 
+    /// A bench with a request to switch on on its way, and that request.
+    pub(crate) fn asked_to_enable() -> (Self, CanFrame) {
+        let mut bench = Self::new();
+        bench.hello(table::HASH);
+        bench.run(2);
+        bench.request(MotionRequest::Stop);
+        let enable = bench.motion(MotionRequest::Enable);
+        bench.wire.to_node.push_back(enable);
+        (bench, enable)
+    }
+
     pub(crate) fn enable(&mut self) {
         self.hello(table::HASH);
         self.run(2);

@@ -343,12 +343,7 @@ fn a_flooded_bus_is_named_where_it_is_felt() {
 /// While the brake opens the drives may not be on yet; and in the 10 ms of a sample other devices may send as much.
 #[test]
 fn other_traffic_is_no_flood() {
-    let mut bench = Bench::new();
-    bench.hello(table::HASH);
-    bench.run(2);
-    bench.request(MotionRequest::Stop);
-    let enable = bench.motion(MotionRequest::Enable);
-    bench.wire.to_node.push_back(enable);
+    let (mut bench, _) = Bench::asked_to_enable();
     bench.obeys = false;
     for _ in 0..20 {
         bench.babble(40);

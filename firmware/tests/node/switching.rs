@@ -106,12 +106,7 @@ fn the_first_request_of_an_operator_switches_nothing_on() {
 
 #[test]
 fn a_replayed_enable_is_dropped() {
-    let mut bench = Bench::new();
-    bench.hello(table::HASH);
-    bench.run(2);
-    bench.request(MotionRequest::Stop);
-    let enable = bench.motion(MotionRequest::Enable);
-    bench.wire.to_node.push_back(enable);
+    let (mut bench, enable) = Bench::asked_to_enable();
     bench.run(100);
     assert_eq!(
         bench.request(MotionRequest::Disable),
