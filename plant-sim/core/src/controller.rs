@@ -132,7 +132,7 @@ impl Peer for InProcess {
     }
 
     fn bus_off(&mut self) -> Result<(), PeerError> {
-        self.node.bus_off();
+        Self::bus_off(self);
         Ok(())
     }
 }
