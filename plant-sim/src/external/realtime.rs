@@ -96,7 +96,7 @@ impl RealTime {
             }
         }
         if self.remote.link.take_bus_off() {
-            self.twin.bus_off();
+            self.twin.bus_off(now);
         }
         Ok(answered)
     }
@@ -127,24 +127,23 @@ impl RealTime {
         }
     }
 
-    /// Sends a frame; for feedback, waits for the answer or the next sample. Returns how long the answer took.
-    fn exchange(&mut self, now: Instant, frame: &CanFrame) -> Result<Duration, PeerError> {
+    /// Sends a frame; for feedback, waits for the answer or the next sample. Returns how long the answer took in the time of the run.
+    fn exchange(&mut self, now: Instant, frame: &CanFrame) -> Result<time::Duration, PeerError> {
         let out = monotonic();
         self.remote.send(frame);
         self.ask_twin(now, Some(frame));
         if sender(frame) != Some(Name::Drives) {
-            return Ok(Duration::ZERO);
+            return Ok(time::Duration::ZERO);
         }
         loop {
             if self.take(now)? {
                 let latency = monotonic().saturating_sub(out);
-                self.clock.answered(latency);
-                return Ok(latency);
+                return Ok(self.clock.answered(latency));
             }
             let left = self.clock.deadline().saturating_sub(monotonic());
             if left.is_zero() || self.remote.lost.is_some() {
                 self.clock.missed();
-                return Ok(Duration::ZERO);
+                return Ok(time::Duration::ZERO);
             }
             self.remote.wait(left);
         }
@@ -172,13 +171,11 @@ impl Peer for RealTime {
                 self.next = now + self.period.duration();
                 self.remote.wait(Duration::ZERO);
                 self.take(now)?;
-                Duration::ZERO
+                time::Duration::ZERO
             }
         };
         // Later frames must not overtake earlier ones.
-        self.last = self
-            .last
-            .max(now + time::Duration::from_nanos(latency.as_nanos() as u64));
+        self.last = self.last.max(now + latency);
         out.extend(self.sent.drain(..).map(|frame| (self.last, frame)));
         world.mind = Mind::of(self.twin.node());
         Ok(())

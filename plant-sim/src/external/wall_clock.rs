@@ -6,7 +6,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use link::realtime::{monotonic, sleep_until};
-use protocol::time::{Instant, Period};
+use protocol::time::{self, Instant, Period};
 use sim::observer::Pace;
 
 use super::timing::Timing;
@@ -55,9 +55,12 @@ impl WallClock {
         samples.origin.unwrap_or_default() + samples.period * (samples.number + 1)
     }
 
-    /// The command of the current sample arrived this long after its feedback.
-    pub fn answered(&self, latency: Duration) {
-        self.0.borrow_mut().timing.answered(latency);
+    /// The command of the current sample arrived this long after its feedback; returns how long that is in the time of the run, of which no
+    /// sample lasts longer than a period: after a longer pause of this process time slips.
+    pub fn answered(&self, latency: Duration) -> time::Duration {
+        let mut samples = self.0.borrow_mut();
+        samples.timing.answered(latency);
+        time::Duration::from_nanos(latency.min(samples.period).as_nanos() as u64)
     }
 
     /// The command of the current sample had not arrived when the next was due.
@@ -85,5 +88,18 @@ impl Pace for WallClock {
             samples.origin = Some(now.saturating_sub(samples.period * samples.number));
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Else a process that was stopped while it waited for a command would hear nothing of the controller for as long again.
+    #[test]
+    fn an_answer_takes_no_longer_than_a_sample_however_long_this_process_has_stood() {
+        let clock = WallClock::new(Period::of_rate(100.0));
+        let answered = [3, 10, 1138].map(|ms| clock.answered(Duration::from_millis(ms)));
+        assert_eq!(answered, [3, 10, 10].map(time::Duration::from_millis));
     }
 }
