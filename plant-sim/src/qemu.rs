@@ -26,7 +26,7 @@ pub use image::image;
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
 use protocol::slcan::MAX_LINE;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 
 use crate::external::peers;
 use crate::say;
@@ -325,13 +325,13 @@ impl Peer for Qemu {
         Ok(())
     }
 
-    fn bus_off(&mut self) -> Result<(), PeerError> {
+    fn bus_off(&mut self, now: Instant) -> Result<Duration, PeerError> {
         // A serial-line adapter has no word for it.
-        if self.channel == Some(Channel::Fifo) {
-            self.twin.bus_off();
-            self.board.send_request(&Request::BusOff)?;
+        if self.channel != Some(Channel::Fifo) {
+            return Ok(Duration::ZERO);
         }
-        Ok(())
+        self.board.send_request(&Request::BusOff)?;
+        Ok(self.twin.bus_off(now))
     }
 
     fn finish(&mut self) -> Result<(), PeerError> {

@@ -6,7 +6,7 @@ use firmware::control::controller::Config;
 use firmware::node::Node;
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 use sim::controller::InProcess;
 use trace::difference::Difference;
 
@@ -52,9 +52,9 @@ impl Twin {
         self.due.extend(self.sent.drain(..));
     }
 
-    /// Tells the twin, as the other, that its CAN controller has gone bus-off.
-    pub fn bus_off(&mut self) {
-        self.controller.bus_off();
+    /// Tells the twin, as the other, that its CAN controller has gone bus-off; returns how long that is then left alone.
+    pub fn bus_off(&mut self, now: Instant) -> Duration {
+        self.controller.bus_off(now)
     }
 
     /// Compares a frame of the other with the next one expected.

@@ -6,7 +6,8 @@ use super::Node;
 use crate::control::fault::OVERRUNS;
 
 impl Node {
-    /// For a shell to report that its CAN controller has gone bus-off (ISO 11898-1), each time; recovery from it is the shell's.
+    /// For a shell to report that its CAN controller has gone bus-off (ISO 11898-1), each time; recovery from it is the shell's
+    /// ([`Rejoin`](crate::cabinet::rejoin::Rejoin)).
     /// What was sent may not have arrived, and whatever keeps a controller off its bus is unlikely to be gone for good.
     // Out of line: rare.
     #[inline(never)]

@@ -169,6 +169,15 @@ impl BuiltinBus {
         self.next = self.foreseen();
     }
 
+    /// Has the software of a node that has just gone bus-off wait until then before it tells its controller to recover.
+    ///
+    /// # Panics
+    /// With a node of another bus.
+    pub fn leave_alone(&mut self, node: NodeId, until: Instant) {
+        self.nodes[node.0].leave_alone(until);
+        self.next = self.foreseen();
+    }
+
     /// Error counters of a node.
     ///
     /// # Panics

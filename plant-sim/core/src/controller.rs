@@ -1,5 +1,6 @@
 //! The controller as a part of this process.
 
+use firmware::cabinet::rejoin::Rejoin;
 use firmware::cabinet::sample_clock::SampleClock;
 use firmware::control::controller::Config;
 use firmware::node::Node;
@@ -27,6 +28,7 @@ pub struct InProcess {
     config: Config,
     node: Node,
     clock: SampleClock,
+    rejoin: Rejoin,
     /// Time of the last feedback, or of the last call without one.
     last: Option<Instant>,
     /// Frames sent in the current call; empty between calls.
@@ -44,6 +46,7 @@ impl InProcess {
             config,
             node: Node::new(config, reason),
             clock: SampleClock::new(config.period),
+            rejoin: Rejoin::default(),
             last: None,
             sent: Vec::new(),
         }
@@ -77,9 +80,10 @@ impl InProcess {
         }
     }
 
-    /// Tells the node that its CAN controller has gone bus-off.
-    pub fn bus_off(&mut self) {
+    /// Tells the node that its CAN controller has gone bus-off; returns how long that is then left alone.
+    pub fn bus_off(&mut self, now: Instant) -> Duration {
         self.node.bus_off();
+        self.rejoin.after_bus_off(now)
     }
 
     /// Calls the node at the caller's time `now`; appends the frames that it sends. A node that has to reset is
@@ -131,8 +135,7 @@ impl Peer for InProcess {
         Ok(())
     }
 
-    fn bus_off(&mut self) -> Result<(), PeerError> {
-        Self::bus_off(self);
-        Ok(())
+    fn bus_off(&mut self, now: Instant) -> Result<Duration, PeerError> {
+        Ok(Self::bus_off(self, now))
     }
 }

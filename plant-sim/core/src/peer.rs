@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use protocol::frame::CanFrame;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 
 use crate::world::World;
 
@@ -34,12 +34,14 @@ pub trait Peer {
         out: &mut Outbox,
     ) -> Result<(), PeerError>;
 
-    /// Its CAN controller has gone bus-off. Nothing happens to a peer that its CAN controller does not tell.
+    /// Its CAN controller has gone bus-off; returns how long it is left alone before it is told to recover. A peer that its CAN
+    /// controller does not tell has one that recovers by itself.
     ///
     /// # Errors
     /// Those of [`Peer::poll`].
-    fn bus_off(&mut self) -> Result<(), PeerError> {
-        Ok(())
+    fn bus_off(&mut self, now: Instant) -> Result<Duration, PeerError> {
+        let _ = now;
+        Ok(Duration::ZERO)
     }
 
     /// Checks what it has left for later. The run has ended.
@@ -77,8 +79,8 @@ impl<P: Peer + ?Sized> Peer for &mut P {
         (**self).poll(now, received, world, out)
     }
 
-    fn bus_off(&mut self) -> Result<(), PeerError> {
-        (**self).bus_off()
+    fn bus_off(&mut self, now: Instant) -> Result<Duration, PeerError> {
+        (**self).bus_off(now)
     }
 
     fn finish(&mut self) -> Result<(), PeerError> {
@@ -102,8 +104,8 @@ impl<P: Peer + ?Sized> Peer for Rc<RefCell<P>> {
         self.borrow_mut().poll(now, received, world, out)
     }
 
-    fn bus_off(&mut self) -> Result<(), PeerError> {
-        self.borrow_mut().bus_off()
+    fn bus_off(&mut self, now: Instant) -> Result<Duration, PeerError> {
+        self.borrow_mut().bus_off(now)
     }
 
     fn finish(&mut self) -> Result<(), PeerError> {

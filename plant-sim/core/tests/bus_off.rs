@@ -126,7 +126,7 @@ fn goes_on(run: &mut Live<'_>, seen: &mut Seen) {
 fn a_burst_of_errors_stops_the_arm_and_a_reset_lets_it_go_on() {
     for (message, node) in [("command", Node::Controller), ("feedback", Node::Drives)] {
         for kind in ["bit", "stuff", "form", "crc"] {
-            let fault = format!("{message}:{kind}-error@0.4s..0.415s");
+            let fault = format!("{message}:{kind}-error@0.4s..0.409s");
             let (mut run, mut seen) = (begin(&config(&[&fault])), Seen::default());
             live(&mut run, &mut seen, 2.5);
             assert!(
@@ -148,6 +148,37 @@ fn a_burst_of_errors_stops_the_arm_and_a_reset_lets_it_go_on() {
             goes_on(&mut run, &mut seen);
         }
     }
+}
+
+/// Whatever destroys its frames for a second: it comes back at once three times, then after a quarter of a second each, so that the others
+/// have their bus, and it is there when the second is over.
+#[test]
+fn a_controller_whose_every_frame_fails_leaves_the_bus_to_the_others() {
+    let fault = "command:bit-error@0.4s..1.4s";
+    let (mut run, mut seen) = (begin(&config(&[fault])), Seen::default());
+    live(&mut run, &mut seen, 2.5);
+    let times = |entries: &[(f64, u8)]| entries.iter().map(|(time, _)| *time).collect::<Vec<_>>();
+    let (off, back) = (times(&seen.off), times(&seen.back));
+    assert_eq!(off.len(), back.len(), "{off:?} {back:?}");
+    let away = off.iter().zip(&back).map(|(off, back)| back - off);
+    for (number, away) in away.enumerate() {
+        let expected = if number < 3 { 0.0 } else { 0.25 };
+        let recessive = away - expected;
+        assert!(
+            (0.001_408..0.003).contains(&recessive),
+            "{number}: {off:?} {back:?}"
+        );
+    }
+    // Three within some 20 ms, and then no more than four in the second.
+    assert!((5..=7).contains(&off.len()), "{off:?}");
+    assert!(off[2] - off[0] < 0.02, "{off:?}");
+    // Feedback is sent as if there were nobody else.
+    let feedback = |(time, frame): &&(Instant, CanFrame)| {
+        protocol::table::FEEDBACK.identifies(frame) && (0.45..1.35).contains(&time.seconds())
+    };
+    assert_eq!(seen.frames.iter().filter(feedback).count(), 900);
+    assert_eq!(seen.causes[0], Cause::BusOff);
+    goes_on(&mut run, &mut seen);
 }
 
 /// Without its acknowledgement nobody goes bus-off.

@@ -55,7 +55,7 @@ impl LockStep {
     fn take(&mut self, now: Instant) -> Result<(), PeerError> {
         while let Some(frame) = self.remote.link.receive() {
             // Before what the controller makes of it.
-            self.hear_of_bus_off();
+            self.hear_of_bus_off(now);
             match sender(&frame) {
                 Some(Name::Controller) => self.answer(&frame)?,
                 Some(Name::Drives | Name::Operator) => {
@@ -73,15 +73,15 @@ impl LockStep {
                 }
             }
         }
-        self.hear_of_bus_off();
+        self.hear_of_bus_off(now);
         Ok(())
     }
 
-    /// The controller hears the same of the interface, and only it knows when.
-    fn hear_of_bus_off(&mut self) {
+    /// The controller hears the same of the interface, and only it knows when. The interface recovers as it is set up.
+    fn hear_of_bus_off(&mut self, now: Instant) {
         if self.remote.link.take_bus_off() {
             self.follows = false;
-            self.twin.bus_off();
+            self.twin.bus_off(now);
         }
     }
 

@@ -15,11 +15,13 @@ use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::wdg::IndependentWatchdog;
 use firmware::cabinet::journal::Journal;
 use firmware::cabinet::pins::Cabinet;
+use firmware::cabinet::rejoin::Rejoin;
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
 use firmware::node::Node;
 use protocol::bus::Bus as _;
 use protocol::messages::ResetReason;
+use protocol::time::Instant;
 
 use can::{Can, Port, Received, ToSend};
 use clock::{CYCLES_PER_TICK, Clock, TICK};
@@ -57,13 +59,21 @@ fn main() -> ! {
     let node = NODE.write(Node::new(Config::new(IRB_930, TICK), last.reason));
     let mut clock = Clock::start();
     let mut port = Port::new(can);
+    let mut rejoin = Rejoin::default();
+    // When the CAN controller is told to recover.
+    let mut back: Option<Instant> = None;
     let mut worst = 0;
     loop {
         let ticked = clock.advance();
         if ticked {
             port.set_estop(cabinet.estop_pressed());
+            let now = clock.now();
             if port.has_gone_off() {
                 node.bus_off();
+                back = Some(now + rejoin.after_bus_off(now));
+            }
+            if back.take_if(|due| *due <= now).is_some() {
+                port.rejoin();
             }
         }
         if ticked || port.has_frames() {

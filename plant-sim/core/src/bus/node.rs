@@ -87,6 +87,13 @@ impl Node {
         }
     }
 
+    /// Its software does not begin the recovery before `until`.
+    pub(super) fn leave_alone(&mut self, until: Instant) {
+        if let Some(Recovery { since, .. }) = &mut self.off {
+            *since = until.max(*since);
+        }
+    }
+
     /// Its software begins the recovery at `attended`, if it has not begun before.
     pub(super) fn attend(&mut self, attended: Instant) {
         if let Some(Recovery { since, .. }) = &mut self.off {

@@ -6,7 +6,7 @@ use oorandom::Rand64;
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{Message, Nmt, Node};
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 
 use super::impostor::like;
 use super::watch::Planned;
@@ -230,8 +230,8 @@ impl<P: Peer> Peer for Faulty<P> {
         Ok(())
     }
 
-    fn bus_off(&mut self) -> Result<(), PeerError> {
-        self.peer.bus_off()
+    fn bus_off(&mut self, now: Instant) -> Result<Duration, PeerError> {
+        self.peer.bus_off(now)
     }
 
     fn finish(&mut self) -> Result<(), PeerError> {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{Message, Mode, MotionRequest, Operation, Outcome};
+use protocol::messages::{Message, Mode, MotionRequest, Operation, Outcome, State};
 use protocol::time::Instant;
 
 use super::program::{Action, Program, announcement};
@@ -293,14 +293,21 @@ impl Peer for Desk {
     ) -> Result<(), PeerError> {
         match received {
             Some(frame) => {
-                let before = self.operator.heard;
+                let (heard, state) = (self.operator.heard, self.operator.state);
                 self.operator.receive(now, frame);
                 self.hear(now, frame, world);
-                // After a silence the controller wants to know again who asks, and takes a first request for a replay.
-                if self.operator.heard.since(before) > SILENCE_LIMIT {
+                // After a silence, its own or that of the drives, the controller wants to know again who asks, and after its own it takes a
+                // first request for a replay.
+                let is_waiting =
+                    |state: Option<State>| state.map(|it| it.mode == Mode::PreOperational);
+                let waits = (is_waiting(state), is_waiting(self.operator.state));
+                let was_silent = self.operator.heard.since(heard) > SILENCE_LIMIT;
+                if was_silent {
+                    self.orders.push_front(Order::Request(MotionRequest::Stop));
+                }
+                if was_silent || waits == (Some(false), Some(true)) {
                     let hello = self.operator.begin(&Action::Hello);
                     out.extend(hello.map(|frame| (now, frame)));
-                    self.orders.push_front(Order::Request(MotionRequest::Stop));
                 }
             }
             None => {

@@ -64,7 +64,8 @@ impl Rig<'_> {
             if report.what == Noticed::State(State::BusOff) {
                 for seat in &mut self.seats {
                     if seat.node == report.node {
-                        seat.peer.bus_off()?;
+                        let pause = seat.peer.bus_off(report.time)?;
+                        self.bus.leave_alone(seat.node, report.time + pause);
                     }
                 }
             }

@@ -112,7 +112,8 @@ impl Can {
                 .set_global_filter(GlobalFilter::reject_all())
                 // By identifier: the oldest frame must not hold back the most urgent one.
                 .set_tx_buffer_mode(TxBufferMode::Priority)
-                .set_automatic_bus_off_recovery(true),
+                // When to recover is the loop's: see [`Port::rejoin`].
+                .set_automatic_bus_off_recovery(false),
         );
         let driver = can.start(OperatingMode::NormalOperationMode);
         compensate_delay();
@@ -188,10 +189,15 @@ impl Port {
         offline
     }
 
-    /// Whether the node has gone bus-off since the last call. A recovery takes 1.4 ms, so that a call every millisecond misses none.
+    /// Whether the node has gone bus-off since the last call.
     pub(crate) fn has_gone_off(&mut self) -> bool {
         self.is_offline();
         core::mem::take(&mut self.went_off)
+    }
+
+    /// Begins the recovery from bus-off, which takes 128 times 11 recessive bits. The CAN controller has set INIT by itself.
+    pub(crate) fn rejoin(&mut self) {
+        pac::FDCAN1.cccr().modify(|w| w.set_init(false));
     }
 
     /// Whether a frame is waiting.
