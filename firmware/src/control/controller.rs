@@ -110,6 +110,8 @@ pub struct Controller {
     held: u16,
     /// First fault since the last reset.
     fault: Fault,
+    /// Whether only the shaft is under torque until the brake has closed: shoulder or elbow has to be without.
+    limp: bool,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
     saturated: u32,
     /// Samples more than the drives have counted that have passed since the last one.
@@ -161,6 +163,7 @@ impl Controller {
             held: 0,
             too_fast: 0,
             fault: Fault::NONE,
+            limp: false,
             alarm: None,
             saturated: 0,
             stuck: 0,
@@ -255,7 +258,9 @@ impl Controller {
         ];
         self.observer.update(&motion, &model, corners);
         let felt = self.observer.residual();
-        if let Some(axis) = self.monitor.feels(felt) {
+        if let Some(axis) = self.monitor.feels(felt)
+            && !self.limp
+        {
             let numbers = [&motion.qd, &self.last_qd, felt, &self.error, &reference.qd];
             let felt = self.monitor.felt(axis, readings, numbers);
             if felt != Felt::Nothing {
@@ -295,7 +300,22 @@ impl Controller {
         probe.end(Phase::Limits);
         Actions {
             control: self.control_word(),
-            torque: limited.motor_torque.into(),
+            torque: self.released(&limited.motor_torque),
+        }
+    }
+
+    /// What of these motor torques the drives may have: while the brake opens, only as much as has built up in half of its time, since a step
+    /// of the load's weight would shake the arm; and the shaft's alone where shoulder or elbow has to be without.
+    fn released(&self, torque: &Vector4<f32>) -> [f32; 4] {
+        let [shoulder, elbow, lift, wrist] = (*torque).into();
+        match self.state {
+            State::Enabling(left) => {
+                let opening = self.setup.brake_delay / self.config.period.seconds();
+                let share = 2.0 - 2.0 * left as f32 / opening;
+                (torque * clamp(share, 0.0, 1.0)).into()
+            }
+            _ if self.limp => [0.0, 0.0, lift, wrist],
+            _ => [shoulder, elbow, lift, wrist],
         }
     }
 

@@ -169,6 +169,21 @@ impl Monitor {
         self.trip(readings, numbers, [following, speed, range])
     }
 
+    /// Judges the axes of the shaft alone, by the same error, where the others are without torque.
+    // Out of line: rarely reached in a sample.
+    #[inline(never)]
+    pub fn shaft(&mut self, error: &Vector4<f32>) -> Option<Fault> {
+        let error = Vector4::new(0.0, 0.0, error.z, error.w);
+        let following = first_beyond(&error, &self.following_error);
+        let axis = count(&mut self.following_count, following, self.needed)?;
+        Some(of_axis(
+            Cause::FollowingError,
+            axis,
+            &error,
+            &self.following_error,
+        ))
+    }
+
     /// Out of line: rarely reached in a sample.
     #[inline(never)]
     fn trip(
