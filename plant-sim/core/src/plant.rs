@@ -13,7 +13,6 @@ mod factor;
 mod friction;
 mod integrator;
 pub mod kinematics;
-mod planar;
 pub mod stop;
 
 use crate::model::{Payload, RobotModel};
