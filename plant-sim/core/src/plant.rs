@@ -207,15 +207,15 @@ impl Plant {
     fn step(&mut self, h: f64) {
         let at = self.arm.at(&self.q);
         let mass = self.total_mass(&at);
-        if self.brake.is_sticking() {
-            let friction = self.friction(&self.qd);
-            let balance = self.balance(&at, &self.q, &self.qd, &friction);
-            let load = self.effort_on_brake(&mass, &balance.effort);
-            self.brake.load(load);
-        }
-        let damping = self.damping(&self.qd);
+        let mut damping = self.damping(&self.qd);
         let friction = damping.component_mul(&self.qd);
         let balance = self.balance(&at, &self.q, &self.qd, &friction);
+        if self.brake.is_sticking() {
+            let load = self.effort_on_brake(&mass, &balance.effort);
+            self.brake.load(load);
+            // One that has begun to slip; at rest that changes no effort.
+            damping[LIFT] += self.brake.sliding_secant(self.qd[LIFT]);
+        }
         let mass = self.constrained(mass);
         let first = Slope {
             force: self.free(balance.effort),
@@ -301,10 +301,10 @@ impl Plant {
     ) -> Balance {
         let speed = self.drive.to_motor(qd);
         let torque = self.given_torque(&speed);
-        let stop = self.stops.effort(q, qd);
+        let (stop, into_springs) = self.stops.push(q, qd);
         let mut effort = self.drive.joint_effort(&torque) - self.arm.bias(at, qd) - friction + stop;
         self.defects.pull(&self.arm, at, &mut effort);
-        let lost = friction.dot(qd) - stop.dot(qd) - self.stops.spring_power(q, qd);
+        let lost = friction.dot(qd) - stop.dot(qd) - into_springs;
         let rates = Rates::new(
             torque[0],
             torque[1],
