@@ -75,7 +75,7 @@ impl Plant {
     /// Longest step of integration, ns: the rest of a millisecond after the command has arrived. The fastest motion to
     /// resolve is a joint on its end stop (400 rad/s): three tenths of a radian per step. Only a robot with extremely
     /// steep friction gets shorter steps.
-    pub const MAX_STEP_NS: u64 = 750_000;
+    pub const MAX_STEP_NS: u64 = 800_000;
 
     /// Shortest step that a robot may make necessary, ns.
     pub const MIN_STEP_NS: u64 = 10_000;
