@@ -231,14 +231,13 @@ impl Node {
     /// would have been missed long before: all that follow would be old.
     fn judge(&mut self, feedback: &Feedback, counter: u8) -> Verdict {
         if let Some((last, _)) = self.newest
-            && let behind = last.wrapping_sub(feedback.sample)
-            && behind < u32::MAX - FARTHEST
             && self.controller.state().is_powered()
         {
-            return match behind {
-                0 => Verdict::Duplicate,
-                _ => Verdict::Stale(1),
-            };
+            match feedback.sample.wrapping_sub(last) {
+                0 => return Verdict::Duplicate,
+                1..=FARTHEST => {}
+                _ => return Verdict::Stale(1),
+            }
         }
         self.feedback.check(counter)
     }

@@ -264,5 +264,16 @@ mod tests {
         assert_eq!(Duration::from_millis(2) * 3, Duration::from_micros(6_000));
         assert_eq!(Duration::from_seconds(-1.0), Duration::ZERO);
         assert_eq!(Duration::from_seconds(0.25), Duration::from_millis(250));
+        let parts = [1, 20, 300].map(Duration::from_micros);
+        assert_eq!(parts.into_iter().sum::<Duration>().micros(), 321);
+        let (mut then, mut long) = (late, Duration::from_micros(40));
+        then += long;
+        assert_eq!(then.micros(), 43);
+        long += Duration::from_micros(2);
+        assert_eq!(long.micros(), 42);
+        long += Duration::MAX;
+        assert_eq!(long, Duration::MAX);
+        let std = core::time::Duration::from(Duration::from_nanos(7));
+        assert_eq!(std.as_nanos(), 7);
     }
 }

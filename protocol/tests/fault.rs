@@ -104,7 +104,8 @@ fn names_of_codes_are_found_again() {
         );
     }
     assert_eq!(Law::from_name("PID"), None);
-    assert!(Law::try_from(Law::ALL.len() as u8).is_err());
+    let unknown = Law::try_from(Law::ALL.len() as u8).unwrap_err();
+    assert_eq!(unknown.to_string(), "unknown code 6");
     for &cause in Cause::ALL {
         assert!(cause.describe().ends_with('.'), "{cause}");
     }

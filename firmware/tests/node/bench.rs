@@ -52,6 +52,8 @@ pub(crate) struct Bench {
     pub sequence: u8,
     pub position: [i32; 4],
     pub velocity: [f32; 4],
+    /// Thousandths of the rated torques.
+    pub torque: [i16; 4],
     /// What the drives report besides whether torque is on.
     pub status: DriveStatus,
     /// Whether the drives do what the control word says.
@@ -78,6 +80,7 @@ impl Bench {
             sequence: 0,
             position: [0; 4],
             velocity: [0.0; 4],
+            torque: [0; 4],
             status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
             obeys: true,
             follows: false,
@@ -138,7 +141,11 @@ impl Bench {
 
     /// A bench in the middle of a fast move.
     pub(crate) fn moving() -> Self {
-        let mut bench = Self::with(by_itself());
+        Self::moving_with(by_itself())
+    }
+
+    pub(crate) fn moving_with(config: Config) -> Self {
+        let mut bench = Self::with(config);
         bench.enable();
         bench.follows = true;
         let target = [-1.0, 0.5, 0.05, -2.0];
@@ -175,7 +182,7 @@ impl Bench {
             status: self.status.with(DriveStatus::TORQUE_ON, is_on),
             position: self.position,
             velocity: self.velocity,
-            torque: [0; 4],
+            torque: self.torque,
         };
         let frame = encode(&Message::Feedback(feedback), self.feedback_counter).unwrap();
         self.sample += 1;

@@ -11,6 +11,7 @@
 mod bench;
 mod beyond;
 mod faults;
+mod following;
 mod gains;
 mod manual;
 mod pair;

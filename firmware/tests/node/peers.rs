@@ -363,23 +363,3 @@ fn other_traffic_is_no_flood() {
         assert_eq!(slow.node.controller().cause(), expected, "{frames}");
     }
 }
-
-/// The drives would long be missed. To believe it would make all that follow old.
-#[test]
-fn a_feedback_from_far_ahead_changes_nothing() {
-    for ahead in [2_000, 1 << 20, u32::MAX / 2 - 1] {
-        let mut bench = Bench::moving();
-        let mut sound = bench.clone();
-        let sample = bench.sample;
-        bench.sample = sample.wrapping_add(ahead);
-        let frame = bench.next_feedback();
-        (bench.sample, bench.feedback_counter) = (sample, sound.feedback_counter);
-        bench.wire.to_node.push_back(frame);
-        bench.poll();
-        assert_eq!(bench.node.received().stale, 1, "{ahead}");
-        assert_eq!(bench.run(50).len(), sound.run(50).len(), "{ahead}");
-        assert_eq!(bench.node.controller().cause(), Cause::None, "{ahead}");
-        let torques = [bench.command(), sound.command()].map(|it| it.torque);
-        assert_eq!(torques[0], torques[1], "{ahead}");
-    }
-}

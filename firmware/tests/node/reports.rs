@@ -149,3 +149,31 @@ fn planning_and_reports_take_turns() {
     }
     assert!(planned > 100);
 }
+
+/// A stop refuses four moves at once. What is left of its answers when the next one is planned waits, if it is no more than two.
+#[test]
+fn up_to_two_answers_wait_for_planning() {
+    let mut bench = Bench::enabled();
+    // The first sample after a pause of planning.
+    while !bench.sample.is_multiple_of(10) {
+        bench.step();
+    }
+    let stop = MotionRequest::Stop;
+    for request in [jump(), jump(), jump(), jump(), stop, jump()] {
+        let frame = bench.motion(request);
+        bench.wire.to_node.push_back(frame);
+    }
+    let answers: Vec<_> = (0..12)
+        .map(|_| {
+            let sent = bench.step();
+            let answers = sent
+                .iter()
+                .filter(|message| matches!(message, Message::MotionReply(_)));
+            answers.count()
+        })
+        .collect();
+    // With the stop, with the next move and with the sample; then in the pause.
+    assert_eq!(answers, [3, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0]);
+    assert_eq!(bench.node.controller().answers_waiting(), 1);
+    assert!(bench.node.controller().is_planning());
+}

@@ -3,7 +3,11 @@
 use firmware::control::controller::{Config, Controller};
 use firmware::control::states::Event;
 use firmware::mechanics::arm::IRB_930;
-use protocol::messages::{Compensation, Law, Message, Mode, MotionRequest, Outcome, RefusalReason};
+use protocol::codec::encode;
+use protocol::messages::{
+    Compensation, Law, Message, Mode, MotionRequest, Outcome, ParameterReply, RefusalReason, Server,
+};
+use protocol::table::HELLO;
 
 use crate::bench::{Bench, PERIOD};
 
@@ -160,4 +164,28 @@ fn the_override_holds_a_move_and_lets_it_go_on() {
     assert_eq!(pace(&bench.run(100)), Some(60));
     assert_eq!(bench.request(set(1.0)), Some(Outcome::Accepted));
     assert_eq!(pace(&bench.run(100)), Some(100));
+}
+
+/// Once each; and who greets the controller has not greeted the operator.
+#[test]
+fn answers_of_the_drives_are_passed_on_once() {
+    let mut bench = Bench::enabled();
+    let value = ParameterReply::Value {
+        index: 0x1020,
+        value: 5.0,
+        lower: 1.0,
+        upper: 50.0,
+    };
+    for (reply, counter, is_passed_on) in [
+        (value, 0, true),
+        (value, 0, false),
+        (value, 1, true),
+        (ParameterReply::Hello(HELLO), 2, false),
+    ] {
+        let frame = encode(&Message::ParameterReply(Server::Drives, reply), counter);
+        bench.wire.to_node.push_back(frame.unwrap());
+        let sent = bench.poll();
+        let answer = Message::ParameterReply(Server::Controller, reply);
+        assert_eq!(sent.contains(&answer), is_passed_on, "{reply:?} {counter}");
+    }
 }

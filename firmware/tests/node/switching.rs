@@ -1,6 +1,9 @@
 //! Switching on and off, and emergency stops.
 
-use protocol::messages::{ControlWord, Message, Mode, MotionRequest, Outcome, RefusalReason};
+use nalgebra::Vector4;
+use protocol::messages::{
+    Cause, ControlWord, Message, Mode, MotionRequest, Outcome, RefusalReason,
+};
 use protocol::table;
 
 use crate::bench::{Bench, SILENCE, estop, is_off};
@@ -42,6 +45,45 @@ fn switching_on_takes_a_known_peer_and_opens_the_brake_under_torque() {
     );
     assert_eq!(bench.mode(), Mode::Ready);
     assert!(is_off(&bench.command()));
+}
+
+/// Before anybody has said what table he has.
+#[test]
+fn a_node_without_peers_knows_where_the_arm_is() {
+    let mut bench = Bench::new();
+    bench.step();
+    assert_eq!(bench.mode(), Mode::PreOperational);
+    let q = bench.node.controller().reference().q;
+    let off = q - Vector4::new(0.2, 1.5, 0.15, 0.3);
+    assert!(off.amax() < 1e-5, "{q}");
+}
+
+/// Two samples beyond the margin of the elbow, 2.531 + 0.02 rad, were the last ones with torque; they do not count for what begins anew.
+#[test]
+fn switching_on_counts_violations_from_the_beginning() {
+    let mut bench = Bench::new();
+    bench.put(&Vector4::new(0.2, 2.54, 0.15, 0.3));
+    bench.enable();
+    let disable = bench.motion(MotionRequest::Disable);
+    bench.wire.to_node.push_back(disable);
+    // Of the 60 ms of the brake.
+    bench.run(58);
+    bench.shove(0.015);
+    bench.run(1);
+    assert_eq!(bench.mode(), Mode::Disabling);
+    bench.run(1);
+    assert_eq!(
+        (bench.mode(), bench.node.controller().cause()),
+        (Mode::Ready, Cause::None)
+    );
+    let enable = bench.motion(MotionRequest::Enable);
+    bench.wire.to_node.push_back(enable);
+    let mut course = Vec::new();
+    for _ in 0..3 {
+        bench.step();
+        course.push(bench.node.controller().cause());
+    }
+    assert_eq!(course, [Cause::None, Cause::None, Cause::SoftLimit]);
 }
 
 #[test]

@@ -316,3 +316,42 @@ fn subnormal_speeds_are_used() {
     }
     assert_eq!(subnormal.node.received().dropped(), 0);
 }
+
+/// The drives would long be missed. To believe it would make all that follow old.
+#[test]
+fn a_feedback_from_far_ahead_changes_nothing() {
+    for ahead in [1_000, 1 << 20, u32::MAX / 2 - 1] {
+        let mut bench = Bench::moving();
+        let mut sound = bench.clone();
+        let sample = bench.sample;
+        bench.sample = sample.wrapping_add(ahead);
+        let frame = bench.next_feedback();
+        (bench.sample, bench.feedback_counter) = (sample, sound.feedback_counter);
+        bench.wire.to_node.push_back(frame);
+        bench.poll();
+        assert_eq!(bench.node.received().stale, 1, "{ahead}");
+        assert_eq!(bench.run(50).len(), sound.run(50).len(), "{ahead}");
+        assert_eq!(bench.node.controller().cause(), Cause::None, "{ahead}");
+        let torques = [bench.command(), sound.command()].map(|it| it.torque);
+        assert_eq!(torques[0], torques[1], "{ahead}");
+    }
+}
+
+/// Whatever its counter says. It may be up to 1000 samples ahead, which is a gap.
+#[test]
+fn a_feedback_has_its_place_by_its_sample() {
+    for (ahead, dropped, expected) in [
+        (-1, [0, 1], Cause::None),
+        (0, [1, 0], Cause::None),
+        (1, [0, 0], Cause::None),
+        (1000, [0, 0], Cause::FeedbackLost),
+        (1001, [0, 1], Cause::None),
+    ] {
+        let mut bench = Bench::enabled();
+        bench.sample = (bench.sample - 1).wrapping_add_signed(ahead);
+        bench.step();
+        let counters = bench.node.received();
+        assert_eq!([counters.duplicate, counters.stale], dropped, "{ahead}");
+        assert_eq!(bench.node.controller().cause(), expected, "{ahead}");
+    }
+}

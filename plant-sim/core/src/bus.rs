@@ -314,6 +314,9 @@ impl BuiltinBus {
     /// A node goes bus-off if its counters say so, on a bus that is idle from `idle` on. If its software begins the recovery it
     /// does so at once.
     fn go_off(&mut self, index: usize, idle: Instant) {
+        if self.nodes[index].counters.state() != State::BusOff {
+            return;
+        }
         let left = Affliction::NoRecovery(NodeId(index));
         let times = self.afflictions.of(left, idle);
         let within = times.filter(|(from, _)| *from <= idle);

@@ -13,7 +13,6 @@ mod factor;
 mod friction;
 mod integrator;
 pub mod kinematics;
-mod planar;
 pub mod stop;
 
 use crate::model::{Payload, RobotModel};
@@ -76,7 +75,7 @@ impl Plant {
     /// Longest step of integration, ns: the rest of a millisecond after the command has arrived. The fastest motion to
     /// resolve is a joint on its end stop (400 rad/s): three tenths of a radian per step. Only a robot with extremely
     /// steep friction gets shorter steps.
-    pub const MAX_STEP_NS: u64 = 750_000;
+    pub const MAX_STEP_NS: u64 = 800_000;
 
     /// Shortest step that a robot may make necessary, ns.
     pub const MIN_STEP_NS: u64 = 10_000;
@@ -208,15 +207,15 @@ impl Plant {
     fn step(&mut self, h: f64) {
         let at = self.arm.at(&self.q);
         let mass = self.total_mass(&at);
-        if self.brake.is_sticking() {
-            let friction = self.friction(&self.qd);
-            let balance = self.balance(&at, &self.q, &self.qd, &friction);
-            let load = self.effort_on_brake(&mass, &balance.effort);
-            self.brake.load(load);
-        }
-        let damping = self.damping(&self.qd);
+        let mut damping = self.damping(&self.qd);
         let friction = damping.component_mul(&self.qd);
         let balance = self.balance(&at, &self.q, &self.qd, &friction);
+        if self.brake.is_sticking() {
+            let load = self.effort_on_brake(&mass, &balance.effort);
+            self.brake.load(load);
+            // One that has begun to slip; at rest that changes no effort.
+            damping[LIFT] += self.brake.sliding_secant(self.qd[LIFT]);
+        }
         let mass = self.constrained(mass);
         let first = Slope {
             force: self.free(balance.effort),
@@ -302,10 +301,10 @@ impl Plant {
     ) -> Balance {
         let speed = self.drive.to_motor(qd);
         let torque = self.given_torque(&speed);
-        let stop = self.stops.effort(q, qd);
+        let (stop, into_springs) = self.stops.push(q, qd);
         let mut effort = self.drive.joint_effort(&torque) - self.arm.bias(at, qd) - friction + stop;
         self.defects.pull(&self.arm, at, &mut effort);
-        let lost = friction.dot(qd) - stop.dot(qd) - self.stops.spring_power(q, qd);
+        let lost = friction.dot(qd) - stop.dot(qd) - into_springs;
         let rates = Rates::new(
             torque[0],
             torque[1],

@@ -85,7 +85,7 @@ fn posture() -> impl Strategy<Value = Posture> {
         .prop_map(|(elbow, turn)| Posture { elbow, turn })
 }
 
-fn request() -> impl Strategy<Value = MotionRequest> {
+pub(crate) fn request() -> impl Strategy<Value = MotionRequest> {
     use MotionRequest as R;
     prop_oneof![
         select(&[R::Enable, R::Disable, R::FaultReset, R::Stop][..]),

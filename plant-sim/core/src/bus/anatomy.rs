@@ -1,5 +1,7 @@
 //! The bits of a frame, one by one, to say where in it an error is. Only frames with errors are taken apart like this.
 
+use std::ops::Range;
+
 use protocol::frame::{CanFrame, FrameKind, Id};
 use protocol::wire::FrameBits;
 
@@ -91,14 +93,19 @@ pub(super) struct Anatomy {
     /// All of them.
     pub(super) bits: Vec<Bit>,
     /// Those that are sent at the data bit rate.
-    fast: std::ops::Range<usize>,
+    fast: Range<usize>,
 }
 
 impl Anatomy {
     /// Takes a frame apart.
     #[must_use]
     pub(super) fn of(frame: &CanFrame) -> Self {
-        let mut stuffed = Stuffed::default();
+        let FrameBits { nominal, data } = FrameBits::exact(frame);
+        let total = (nominal + data - INTERMISSION) as usize;
+        let mut stuffed = Stuffed {
+            bits: Vec::with_capacity(total),
+            ..Stuffed::default()
+        };
         stuffed.push(Field::StartOfFrame, 0, 1);
         let remote = u64::from(frame.is_remote());
         let is_fd = frame.is_fd();
@@ -142,8 +149,6 @@ impl Anatomy {
 
         // What is left is known by its length alone.
         let mut bits = stuffed.bits;
-        let FrameBits { nominal, data } = FrameBits::exact(frame);
-        let total = (nominal + data - INTERMISSION) as usize;
         let delimiter = total - TRAILER.len() - 1;
         let plain = |field, recessive| Bit {
             field,
@@ -164,7 +169,8 @@ impl Anatomy {
     /// Length of the frame up to this bit and with it.
     #[must_use]
     pub(super) fn until(&self, index: usize) -> FrameBits {
-        let fast = (self.fast.clone()).filter(|&bit| bit <= index).count();
+        let Range { start, end } = self.fast;
+        let fast = (index + 1).clamp(start, end) - start;
         FrameBits {
             nominal: (index + 1 - fast) as u32,
             data: fast as u32,

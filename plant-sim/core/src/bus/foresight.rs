@@ -2,7 +2,7 @@
 //! of a node.
 
 use protocol::frame::CanFrame;
-use protocol::time::{Duration, Instant};
+use protocol::time::Instant;
 use protocol::wire::INTERMISSION;
 
 use super::affliction::{Affliction, Level};
@@ -134,21 +134,22 @@ impl BuiltinBus {
             .min()?;
         let candidates =
             || nodes().filter_map(|(index, _)| Some((index, self.candidate(index, start)?.1)));
-        let (_, winner) = candidates().min_by_key(|(_, mailbox)| mailbox.arbitration)?;
-        let arbitration = winner.arbitration;
-        let equals = || candidates().filter(move |(_, it)| it.arbitration == arbitration);
-
-        let differs = equals().any(|(_, mailbox)| mailbox.frame != winner.frame);
-        let (frame, clash) = if differs {
-            self.clash(equals().map(|(index, it)| (index, it.frame)).collect())
-        } else {
-            (winner.frame, None)
-        };
+        let (first, winner) = candidates().min_by_key(|(_, mailbox)| mailbox.arbitration)?;
+        let (mut frame, mut duration, mut clash) = (winner.frame, winner.duration, None);
         let mut from = NodeSet::default();
-        let mut duration = Duration::ZERO;
-        for (index, mailbox) in equals().filter(|(_, mailbox)| mailbox.frame == frame) {
-            from.insert(index);
-            duration = mailbox.duration;
+        from.insert(first);
+        let is_equal = |(_, it): &(usize, &Mailbox)| it.arbitration == winner.arbitration;
+        let equals = || candidates().filter(is_equal);
+        if equals().nth(1).is_some() {
+            if equals().any(|(_, mailbox)| mailbox.frame != frame) {
+                let frames = equals().map(|(index, it)| (index, it.frame));
+                (frame, clash) = self.clash(frames.collect());
+            }
+            from = NodeSet::default();
+            for (index, mailbox) in equals().filter(|(_, mailbox)| mailbox.frame == frame) {
+                from.insert(index);
+                duration = mailbox.duration;
+            }
         }
         let mut next = Transmission {
             start,

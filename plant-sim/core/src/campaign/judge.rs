@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 use std::io;
 
-use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{
     Cause, Command, ControlWord, Emergency, Message, Mode, Motion, MotionRequest, Node,
 };
 use protocol::time::{Duration, Instant, Period};
+use protocol::{codec, table};
 
 use super::bounds::{Bounds, SAMPLES_TO_REPORT, STANDING};
 use super::expect::{Expected, stops_under_control};
@@ -331,7 +331,9 @@ impl Judge {
 
 impl Observer for Judge {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
-        let Ok(received) = codec::decode(frame) else {
+        // Feedback are the most frames, and the longest.
+        let decoded = (!table::FEEDBACK.identifies(frame)).then(|| codec::decode(frame));
+        let Some(Ok(received)) = decoded else {
             return Ok(());
         };
         match received.message {

@@ -115,26 +115,31 @@ impl Brake {
 
     /// Lets a slipping brake grip when nearly at rest, at `speed` (m/s). Returns whether it has just gripped.
     pub(super) fn grip(&mut self, speed: f64) -> bool {
-        let grips = self.closed && !self.sticking && speed.abs() < Self::GRIP_SPEED;
+        let grips = self.is_sliding() && speed.abs() < Self::GRIP_SPEED;
         self.sticking |= grips;
         grips
     }
 
     /// Friction against a sliding lift, N.
     pub(super) fn sliding_friction(&self, speed: f64) -> f64 {
-        coulomb(self.sliding_capacity(), Self::GRIP_SPEED, speed)
+        if self.is_sliding() {
+            coulomb(self.capacity, Self::GRIP_SPEED, speed)
+        } else {
+            0.0
+        }
     }
 
     /// That friction divided by speed.
     pub(super) fn sliding_secant(&self, speed: f64) -> f64 {
-        coulomb_secant(self.sliding_capacity(), Self::GRIP_SPEED, speed)
-    }
-
-    fn sliding_capacity(&self) -> f64 {
-        if self.closed && !self.sticking {
-            self.capacity
+        if self.is_sliding() {
+            coulomb_secant(self.capacity, Self::GRIP_SPEED, speed)
         } else {
             0.0
         }
+    }
+
+    /// Whether it is closed and the lift moves all the same.
+    pub(super) fn is_sliding(&self) -> bool {
+        self.closed && !self.sticking
     }
 }

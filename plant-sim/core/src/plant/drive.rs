@@ -109,12 +109,11 @@ impl Drive {
         let limit = self.train.motor_torque_limit[axis];
         let top = self.train.motor_speed_limit[axis];
         let beyond = speed.abs() - top;
-        let driving = if beyond > 0.0 {
-            limit * (1.0 - beyond / (SPEED_TAPER * top)).max(0.0)
-        } else {
-            limit
-        };
-        if speed >= 0.0 {
+        if beyond <= 0.0 {
+            return (-limit, limit);
+        }
+        let driving = limit * (1.0 - beyond / (SPEED_TAPER * top)).max(0.0);
+        if speed > 0.0 {
             (-limit, driving)
         } else {
             (-driving, limit)

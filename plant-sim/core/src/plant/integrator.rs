@@ -43,6 +43,10 @@ const WEIGHTS: [f64; 4] = [
     GAMMA,
 ];
 
+/// Speed below which an axis stands, rad/s and m/s: in the age of the universe it would move by less than the last place of
+/// its position. Friction alone would slow it down for ever, and processors are slow with the smallest numbers.
+const LEAST_SPEED: f64 = 1e-40;
+
 /// Rates of the quantities integrated along with the motion: four motor torques, motor power, lost power.
 pub(super) type Rates = SVector<f64, 6>;
 
@@ -87,6 +91,8 @@ pub(super) fn step(
         *q += dq[i] * WEIGHTS[i];
         *qd += dqd[i] * WEIGHTS[i];
     }
+    let stands = |speed: f64| speed.abs() < LEAST_SPEED;
+    *qd = qd.map(|speed| if stands(speed) { 0.0 } else { speed });
     integral
 }
 

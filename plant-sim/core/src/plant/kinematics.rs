@@ -1,10 +1,9 @@
 //! Kinematics of the flange: pose, velocity, and inverse kinematics.
 
 use super::arm::{Arm, Configuration, WRIST};
-use super::planar::Transform;
 use crate::maths::{atan2, hypot, sin_cos, square};
 use crate::model::{Geometry, JointLimits};
-use nalgebra::{Matrix3, SMatrix, Vector3, Vector4, Vector6};
+use nalgebra::{Matrix3, SMatrix, Vector2, Vector3, Vector4, Vector6};
 use std::f64::consts::{PI, TAU};
 
 /// Pose of the flange in the coordinates that a SCARA can move; it always points down.
@@ -137,18 +136,12 @@ impl Arm {
 
     /// Where axis 2 meets the height of the flange, and the origin of the flange; m, frame 0.
     fn elbow_and_flange(&self, at: &Configuration) -> (Vector3<f64>, Vector3<f64>) {
-        let Geometry { a1, a2, d1, d2, d4 } = self.geometry;
-        let shoulder = Transform {
-            along: 0.0,
-            turn: sin_cos(at.q[0]),
-        };
+        let Geometry { d1, d2, d4, .. } = self.geometry;
+        let (sin, cos) = sin_cos(at.q[0]);
         let z = d1 + d2 - d4 - at.q[2];
-        let in_frame_0 = |vector| {
-            let [x, y] = shoulder.turn_back(vector);
-            Vector3::new(x, y, z)
-        };
-        let [x, y] = at.elbow.turn_back([a2, 0.0]);
-        (in_frame_0([a1, 0.0]), in_frame_0([a1 + x, y]))
+        let in_frame_0 =
+            |v: Vector2<f64>| Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, z);
+        (in_frame_0(at.elbow), in_frame_0(at.elbow + at.wrist))
     }
 }
 

@@ -61,8 +61,17 @@ impl EndStops {
         }
     }
 
-    /// Efforts that push the joints back inside. A stop never pulls.
-    pub fn effort(&self, q: &Vector4<f64>, qd: &Vector4<f64>) -> Vector4<f64> {
+    /// Efforts that push the joints back inside, and the power (W) that goes into the springs; the rest of what the joints
+    /// deliver to the stops is lost.
+    pub fn push(&self, q: &Vector4<f64>, qd: &Vector4<f64>) -> (Vector4<f64>, f64) {
+        if (0..4).all(|i| (self.lower[i]..=self.upper[i]).contains(&q[i])) {
+            return (Vector4::zeros(), 0.0);
+        }
+        (self.effort(q, qd), self.spring_power(q, qd))
+    }
+
+    /// A stop never pulls.
+    fn effort(&self, q: &Vector4<f64>, qd: &Vector4<f64>) -> Vector4<f64> {
         Vector4::from_fn(|i, _| {
             let depth = self.depth(q, i);
             if depth == 0.0 {
@@ -84,8 +93,7 @@ impl EndStops {
             .sum()
     }
 
-    /// Power that goes into the springs, W; the rest of what the joints deliver to the stops is lost.
-    pub fn spring_power(&self, q: &Vector4<f64>, qd: &Vector4<f64>) -> f64 {
+    fn spring_power(&self, q: &Vector4<f64>, qd: &Vector4<f64>) -> f64 {
         (0..4)
             .map(|i| self.stiffness[i] * self.depth(q, i) * qd[i])
             .sum()

@@ -1,4 +1,4 @@
-//! The same algorithms in six dimensions: a check that knows nothing of a SCARA but its list of joints.
+//! The chain in six dimensions: a check that knows nothing of a SCARA but its list of joints.
 //!
 //! Recursive Newton-Euler and composite rigid bodies in spatial form (Featherstone 2008, tables 5.1 and 6.2).
 

@@ -2,8 +2,8 @@
 //!
 //! The oracle shares neither frames nor formulas with the plant: homogeneous transforms of the standard DH table,
 //! Jacobians by cross products, Lagrange's equations with the mass matrix differentiated numerically, and the
-//! articulated-body algorithm on dense 6 x 6 matrices. A second check runs the plant's own algorithms in six
-//! dimensions, to test their reduction to the plane.
+//! articulated-body algorithm on dense 6 x 6 matrices. A second check runs the recursive algorithms in six
+//! dimensions, to test the plant's reduction to the plane.
 
 #![allow(
     clippy::expect_used,
