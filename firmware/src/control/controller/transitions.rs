@@ -128,14 +128,12 @@ impl Controller {
             }
             Felt::Nothing => {}
         }
-        let torque = if self.state.is_powered() {
-            self.released(&self.chatter.last())
-        } else {
-            [0.0; 4]
-        };
+        if !self.state.is_powered() {
+            return self.torque_off();
+        }
         Actions {
             control: self.control_word(),
-            torque,
+            torque: self.released(self.chatter.last()).into(),
         }
     }
 
