@@ -186,7 +186,11 @@ impl Node {
                     self.bad_feedback = 0;
                     return self.sample(feedback, now, bus, probe);
                 }
-                self.suspect(Cause::Reordered);
+                if self.has_let_go(feedback.status) {
+                    self.suspect(Cause::DriveFault, Some(feedback.status));
+                } else {
+                    self.suspect(Cause::Reordered, None);
+                }
             }
             Message::Motion(motion) => {
                 let verdict = self.motion.check(counter);

@@ -84,7 +84,7 @@ fn an_encoder_that_stands_is_stuck() {
             Axis::Shoulder,
             [still, still],
             0.115,
-            (Cause::Collision, Axis::Shoulder),
+            (Cause::Collision, Axis::Elbow),
         ),
         // One that turns back stands for an instant only.
         (
@@ -118,7 +118,7 @@ fn an_encoder_that_stands_is_stuck() {
 #[test]
 fn an_encoder_that_goes_back_is_reversed() {
     let reversed = (Cause::EncoderFault, Axis::Elbow);
-    let obstacle = (Cause::Collision, Axis::Shoulder);
+    let obstacle = (Cause::Collision, Axis::Elbow);
     for (before, now, found, expected) in [
         (1.0, 0.9, -0.76, reversed),
         (1.0, 0.9, -0.74, obstacle),
@@ -143,7 +143,7 @@ fn an_encoder_that_goes_back_is_reversed() {
 #[test]
 fn an_axis_that_runs_away_from_its_torque_has_a_wrong_encoder() {
     let away = (Cause::EncoderFault, Axis::Shoulder);
-    let obstacle = (Cause::Collision, Axis::Shoulder);
+    let obstacle = (Cause::Collision, Axis::Elbow);
     for (motors, torque, now, expected) in [
         ([10.0, 13.0], -1.0, 0.8, away),
         ([10.0, 13.0], -1.0, -0.8, away),

@@ -27,6 +27,7 @@ use serde::{Deserialize, Serialize};
 use crate::control::chatter::Chatter;
 use crate::control::heat::Heat;
 use crate::control::laws::observer::MomentumObserver;
+use crate::control::laws::pd_gravity;
 use crate::control::laws::{ControlInput, Memory, Model, Motion, Task};
 use crate::control::limits;
 use crate::control::monitor::{Felt, Monitor};
@@ -110,6 +111,8 @@ pub struct Controller {
     held: u16,
     /// First fault since the last reset.
     fault: Fault,
+    /// Whether only the shaft is under torque until the brake has closed: shoulder or elbow has to be without.
+    limp: bool,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
     saturated: u32,
     /// Samples more than the drives have counted that have passed since the last one.
@@ -161,6 +164,7 @@ impl Controller {
             held: 0,
             too_fast: 0,
             fault: Fault::NONE,
+            limp: false,
             alarm: None,
             saturated: 0,
             stuck: 0,
@@ -255,7 +259,9 @@ impl Controller {
         ];
         self.observer.update(&motion, &model, corners);
         let felt = self.observer.residual();
-        if let Some(axis) = self.monitor.feels(felt) {
+        if let Some(axis) = self.monitor.feels(felt)
+            && !self.limp
+        {
             let numbers = [&motion.qd, &self.last_qd, felt, &self.error, &reference.qd];
             let felt = self.monitor.felt(axis, readings, numbers);
             if felt != Felt::Nothing {
@@ -269,7 +275,12 @@ impl Controller {
             nominal_inertia: &self.body.nominal_inertia,
             disturbance: self.observer.for_law(corners),
         };
-        let torque = self.setup.selection.torque(&input, &mut self.memory);
+        let torque = if self.limp {
+            // Axis by axis: what the arm's encoders show must not reach the shaft.
+            of_shaft(pd_gravity::torque(&input, &self.setup.selection.gains))
+        } else {
+            self.setup.selection.torque(&input, &mut self.memory)
+        };
         if !torque.iter().all(|torque| torque.is_finite()) {
             // No finite input leads here; should it happen, close the brake.
             self.unlearn();
@@ -295,7 +306,20 @@ impl Controller {
         probe.end(Phase::Limits);
         Actions {
             control: self.control_word(),
-            torque: limited.motor_torque.into(),
+            torque: self.released(limited.motor_torque).into(),
+        }
+    }
+
+    /// What of these motor torques the drives may have in the state that this sample has led to: none for the arm where it has to be without;
+    /// and while the brake opens as much as builds up in half of its time, as a step of the load's weight would shake the arm.
+    fn released(&self, torque: Vector4<f32>) -> Vector4<f32> {
+        match self.state {
+            State::Enabling(left) => {
+                let opening = self.setup.brake_delay / self.config.period.seconds();
+                torque * clamp(2.0 - 2.0 * left as f32 / opening, 0.0, 1.0)
+            }
+            _ if self.limp => of_shaft(torque),
+            _ => torque,
         }
     }
 
@@ -320,6 +344,11 @@ impl Controller {
             self.unanswered = self.unanswered.saturating_add(1);
         }
     }
+}
+
+/// Torques of joints or motors without those of the arm.
+fn of_shaft(torque: Vector4<f32>) -> Vector4<f32> {
+    Vector4::new(0.0, 0.0, torque.z, torque.w)
 }
 
 /// Mean velocity over the sample that ends at `reference`, exact for constant jerk since the reference `before`.

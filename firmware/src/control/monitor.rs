@@ -169,6 +169,21 @@ impl Monitor {
         self.trip(readings, numbers, [following, speed, range])
     }
 
+    /// Judges the axes of the shaft alone, by the same error, where the others are without torque.
+    // Out of line: rarely reached in a sample.
+    #[inline(never)]
+    pub fn shaft(&mut self, error: &Vector4<f32>) -> Option<Fault> {
+        let error = Vector4::new(0.0, 0.0, error.z, error.w);
+        let following = first_beyond(&error, &self.following_error);
+        let axis = count(&mut self.following_count, following, self.needed)?;
+        Some(of_axis(
+            Cause::FollowingError,
+            axis,
+            &error,
+            &self.following_error,
+        ))
+    }
+
     /// Out of line: rarely reached in a sample.
     #[inline(never)]
     fn trip(
@@ -180,7 +195,7 @@ impl Monitor {
         // A jump shows as a speed beyond its limit, if not as a following error.
         let jump = self.jump * readings.steps as f32;
         let moved = error - before;
-        if let Some(axis) = first_beyond(&moved, &jump)
+        if let Some(axis) = most_beyond(&moved, &jump)
             && self.missed(readings, qd, last_qd) == 0
         {
             return Some(of_axis(Cause::EncoderFault, axis, &moved, &jump));
@@ -189,6 +204,7 @@ impl Monitor {
             self.velocity = readings.velocity;
         }
         let needed = self.needed;
+        let following = following.and(most_beyond(error, &self.following_error));
         let following = count(&mut self.following_count, following, needed).map(|axis| {
             let cause = self.why_not_following(readings, axis, axis.of(qd) * axis.of(error));
             of_axis(cause, axis, error, &self.following_error)
@@ -270,6 +286,7 @@ impl Monitor {
         } else if is_away && readings.runs_away(axis, axis.of(&self.velocity_felt)) {
             of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
         } else {
+            let axis = most_beyond(disturbance, &self.collision).unwrap_or(axis);
             of_axis(Cause::Collision, axis, disturbance, &self.collision)
         })
     }
@@ -307,6 +324,17 @@ fn first_beyond(value: &Vector4<f32>, limit: &Vector4<f32>) -> Option<Axis> {
         // The bits of magnitudes compare like integers, and NaN is beyond every limit.
         .find(|((_, value), limit)| value.abs().to_bits() > limit.to_bits())
         .map(|((axis, _), _)| axis)
+}
+
+/// The axis that is farthest beyond its limit: the lift is measured through the wrist, and a faulty axis shakes the others.
+// Out of line: rarely reached in a sample.
+#[inline(never)]
+fn most_beyond(value: &Vector4<f32>, limit: &Vector4<f32>) -> Option<Axis> {
+    first_beyond(value, limit)?;
+    let share = value.component_div(limit).abs();
+    let most = share.max();
+    let mut axes = Axis::ALL.into_iter();
+    axes.find(|axis| axis.of(&share) >= most)
 }
 
 /// Counts consecutive violations; returns the axis once there are `needed` of them.

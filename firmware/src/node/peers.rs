@@ -83,12 +83,13 @@ impl Node {
         self.received.refuse(&error);
         self.strangers = self.strangers.saturating_add(1);
         if table::FEEDBACK.identifies(frame) {
-            self.suspect(match error {
+            let cause = match error {
                 DecodeError::Value(_) | DecodeError::Malformed | DecodeError::NotCanonical => {
                     Cause::BadValue
                 }
                 _ => Cause::Corrupted,
-            });
+            };
+            self.suspect(cause, None);
         }
     }
 
@@ -102,13 +103,21 @@ impl Node {
             .fail(Fault::value(Cause::DuplicateNode, id, 0.0));
     }
 
-    /// Counts bad feedback frames; several in a row stop the arm.
-    pub(super) fn suspect(&mut self, cause: Cause) {
+    /// Whether drives that should have torque have none, as when they have started anew. While the brake opens they may not be on yet.
+    pub(super) fn has_let_go(&self, status: DriveStatus) -> bool {
+        let state = self.controller.state();
+        let has_torque = state.is_powered() && !matches!(state, State::Enabling(_));
+        has_torque && !status.contains(DriveStatus::TORQUE_ON)
+    }
+
+    /// Counts bad feedback frames; several in a row stop the arm. The fault has their number, or what the drives say.
+    pub(super) fn suspect(&mut self, cause: Cause, status: Option<DriveStatus>) {
         self.bad_feedback = self.bad_feedback.saturating_add(1);
         if u32::from(self.bad_feedback) >= self.controller.setup().bad_frames {
-            let frames = f32::from(self.bad_feedback);
+            let value = status.map_or(self.bad_feedback, DriveStatus::bits);
             self.bad_feedback = 0;
-            self.controller.fail(Fault::value(cause, frames, 0.0));
+            let value = f32::from(value);
+            self.controller.fail(Fault::value(cause, value, 0.0));
         }
     }
 
@@ -117,10 +126,7 @@ impl Node {
     // Out of line: rare.
     #[inline(never)]
     pub(super) fn feel_flood(&mut self, steps: u32, status: DriveStatus) {
-        // While the brake opens the drives may not be on yet.
-        let is_opening = matches!(self.controller.state(), State::Enabling(_));
-        let has_let_go = !status.contains(DriveStatus::TORQUE_ON) && !is_opening;
-        if steps > 1 || has_let_go {
+        if steps > 1 || self.has_let_go(status) {
             self.blame_flood(steps as f32 * self.controller.period());
         }
     }

@@ -27,11 +27,7 @@ fn course(words: &[ControlWord]) -> Vec<ControlWord> {
 #[test]
 fn a_bad_encoder_takes_brake_and_torque_off_in_the_same_command() {
     let lost = |bench: &mut Bench| bench.status = DriveStatus::READY;
-    let jumped = |bench: &mut Bench| {
-        bench.follows = false;
-        // One turn of motor 1 is 0.079 rad; ten are more than the axis can move in any gap.
-        bench.position[0] += 10 * 131_072;
-    };
+    let jumped = |bench: &mut Bench| jump(bench, 2);
     for harm in [lost, jumped] {
         for mut bench in [Bench::enabled(), Bench::moving()] {
             harm(&mut bench);
@@ -48,11 +44,52 @@ fn a_bad_encoder_takes_brake_and_torque_off_in_the_same_command() {
         }
     }
     let mut bench = Bench::moving();
-    jumped(&mut bench);
+    jump(&mut bench, 0);
     let sent = bench.step();
     let state = states(&sent)[0];
     assert_eq!(state.fault_axis, FaultAxis::Shoulder);
     assert!(state.fault_value.abs() > 0.7, "{}", state.fault());
+}
+
+/// Lets the encoder of a motor jump: by 0.79 rad or 0.25 m, more than the axis can move in any gap.
+fn jump(bench: &mut Bench, motor: usize) {
+    bench.follows = false;
+    bench.position[motor] += 10 * 131_072;
+}
+
+/// The brake needs its time, and the lift would fall meanwhile: its motor holds it, for as long as the brake does not close.
+#[test]
+fn the_lift_is_held_where_an_axis_of_the_arm_must_be_without_torque() {
+    let carried = 1.95 * 9.81 / (std::f32::consts::TAU / 0.025);
+    for (motor, stuck) in [(0, false), (1, false), (1, true)] {
+        let mut bench = Bench::enabled();
+        bench.status = bench.status.with(DriveStatus::BRAKE_RELEASED, stuck);
+        jump(&mut bench, motor);
+        let mut held = 0;
+        loop {
+            let command = bench.command();
+            if command.control == OFF || held == 500 {
+                break;
+            }
+            assert_eq!(command.control, BRAKE);
+            assert_eq!((command.torque[0], command.torque[1]), (0.0, 0.0));
+            assert!(
+                (command.torque[2] + carried).abs() < 0.05 * carried,
+                "{command:?}"
+            );
+            held += 1;
+        }
+        assert_eq!(bench.node.controller().cause(), Cause::EncoderFault);
+        if stuck {
+            assert_eq!(held, 500);
+            // Its own encoder is another matter.
+            jump(&mut bench, 2);
+            bench.run(5);
+            assert!(is_off(&bench.command()));
+        } else {
+            assert!((59..=61).contains(&held), "{held}");
+        }
+    }
 }
 
 /// The faulty drive may be the one of the lift: then only the brake holds it.
@@ -111,7 +148,7 @@ fn torque_holds_the_lift_until_the_brake_has_closed() {
     }
 }
 
-/// A stop that the arm does not follow closes the brake; if it does not follow even then, torque goes off.
+/// A stop that the arm does not follow closes the brake; if it does not follow even then, its torque goes off.
 #[test]
 fn a_stop_that_is_not_followed_ends_at_the_brake() {
     let mut bench = Bench::moving();
@@ -120,14 +157,18 @@ fn a_stop_that_is_not_followed_ends_at_the_brake() {
     bench.follows = false;
     // Slow, and not still, as a stuck encoder would be.
     bench.velocity = [1.0; 4];
-    let words = bench.words(60);
+    let commands: Vec<_> = (0..200).map(|_| bench.command()).collect();
+    let words: Vec<_> = commands.iter().map(|command| command.control).collect();
     let expected = [ESTOP_STOPPING, ESTOP_BRAKE, ControlWord::ESTOP];
     assert_eq!(course(&words), expected);
-    let closing = words.iter().filter(|word| **word == ESTOP_BRAKE).count();
-    assert_eq!(closing, 3, "three samples in a row");
+    let closing = commands
+        .iter()
+        .filter(|command| command.control == ESTOP_BRAKE);
+    let pushing = closing.filter(|command| command.torque[0] != 0.0).count();
+    assert_eq!(pushing, 3, "until the third sample in a row");
 }
 
-/// No loop is closed through an encoder that does not move: torque goes off without the time of the brake.
+/// No loop is closed through an encoder that does not move: the arm's torque goes off without the time of the brake.
 #[test]
 fn a_stop_through_a_stuck_encoder_ends_without_torque() {
     let mut bench = Bench::moving();
@@ -135,10 +176,17 @@ fn a_stop_through_a_stuck_encoder_ends_without_torque() {
     bench.step();
     bench.follows = false;
     bench.velocity = [0.0; 4];
+    let commands: Vec<_> = (0..100).map(|_| bench.command()).collect();
+    let words: Vec<_> = commands.iter().map(|command| command.control).collect();
     assert_eq!(
-        course(&bench.words(60)),
-        [ESTOP_STOPPING, ControlWord::ESTOP]
+        course(&words),
+        [ESTOP_STOPPING, ESTOP_BRAKE, ControlWord::ESTOP]
     );
+    let stopped = words.iter().position(|word| *word == ESTOP_BRAKE).unwrap();
+    let arm = commands[stopped..]
+        .iter()
+        .map(|it| (it.torque[0], it.torque[1]));
+    assert!(arm.into_iter().all(|torque| torque == (0.0, 0.0)));
 }
 
 /// An undisturbed stop comes to rest on the path before the brake closes.

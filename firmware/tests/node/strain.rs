@@ -177,7 +177,7 @@ fn a_torque_from_limit_to_limit_and_back_is_chatter_at_the_fifth_turn() {
         (Cause::Chatter, FaultAxis::Elbow, 400.0, 80.0),
         "{fault}"
     );
-    assert_eq!(sides, 6);
+    assert_eq!(sides, 5);
 }
 
 /// The torque that the elbow may have for ever warms it up to all of it. From 90 % on moves are slower, and the state says so.

@@ -257,3 +257,30 @@ fn an_obstacle_is_felt_as_soon_with_a_slow_observer() {
         );
     }
 }
+
+/// The lift is measured through the wrist: a wrong angle of that shows in both, and in the wrist by far more.
+#[test]
+fn a_wrong_wrist_is_not_told_as_the_lift() {
+    for jump in ["0.5", "1.5", "2", "-3"] {
+        let (summary, _) = gate(
+            "computed-torque:observer",
+            &format!("encoder:wrist:jump={jump}@0.4s"),
+        );
+        let first = &summary.faults[0];
+        assert_eq!(
+            (first.cause, first.axis),
+            (Cause::EncoderFault.name(), Some("wrist")),
+            "{jump}"
+        );
+    }
+}
+
+/// Their samples begin at 0 again, and they are without torque.
+#[test]
+fn drives_that_start_anew_are_told_as_a_drive_fault() {
+    for fault in ["drives:dead@0.4s..+50ms", "drives:dead@0.4s..+4ms"] {
+        let (summary, _) = gate("computed-torque:observer", fault);
+        let first = &summary.faults[0];
+        assert_eq!(first.cause, Cause::DriveFault.name(), "{fault}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Entry actions of the states, and the events that change them.
 
 use nalgebra::Vector4;
-use protocol::messages::{Cause, ControlWord, DriveStatus, Fault, LimitFlags};
+use protocol::messages::{Cause, ControlWord, DriveStatus, Fault, FaultAxis, LimitFlags};
 
 use super::{Actions, Controller};
 use crate::control::fault;
@@ -35,7 +35,15 @@ impl Controller {
             // Before the transition, which may lead to a state without a latched fault.
             self.fault = fault;
         }
-        let changed = fault::event(fault.cause, self.state).is_some_and(|event| self.event(event));
+        let changed = match fault::event(fault.cause, self.state) {
+            // The lift need not fall because an axis of the arm has to be without torque, least of all if its brake is stuck.
+            Some(Event::FaultOff) if self.state.is_powered() && is_of_arm(fault.axis) => {
+                let first = !self.limp;
+                self.limp = true;
+                self.event(Event::FaultBrake) || first
+            }
+            event => event.is_some_and(|event| self.event(event)),
+        };
         if changed || (first && fault.cause == Cause::SelfTest) {
             self.alarm.get_or_insert(fault);
         } else {
@@ -46,6 +54,7 @@ impl Controller {
     fn enter(&mut self, next: State) {
         match next {
             State::Enabling(_) => {
+                self.limp = false;
                 self.unlearn();
                 self.monitor.reset();
             }
@@ -89,6 +98,13 @@ impl Controller {
             self.fail(fault);
         }
         let error = self.setpoint.reference.q - q;
+        if self.limp {
+            // Nothing else is under torque.
+            if let Some(fault) = self.monitor.shaft(&error) {
+                self.fail(fault);
+            }
+            return;
+        }
         // The reference of the last sample: at most one sample of motion older than `q`.
         let moved = self.setpoint.reference.qd * self.config.period.seconds();
         let numbers = [&(error + moved), &self.error, &self.last_qd];
@@ -112,14 +128,12 @@ impl Controller {
             }
             Felt::Nothing => {}
         }
-        let torque = if self.state.is_powered() {
-            self.chatter.last().into()
-        } else {
-            [0.0; 4]
-        };
+        if !self.state.is_powered() {
+            return self.torque_off();
+        }
         Actions {
             control: self.control_word(),
-            torque,
+            torque: self.released(self.chatter.last()).into(),
         }
     }
 
@@ -153,4 +167,9 @@ impl Controller {
     pub fn control_word(&self) -> ControlWord {
         self.state.control_word()
     }
+}
+
+/// Whether a fault concerns an axis of the arm, and not the shaft that the brake holds.
+fn is_of_arm(axis: FaultAxis) -> bool {
+    matches!(axis, FaultAxis::Shoulder | FaultAxis::Elbow)
 }

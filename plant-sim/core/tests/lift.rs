@@ -1,0 +1,87 @@
+//! The lift under load: no step of its torque as it is switched on, and no fall whose brake is stuck open while something else breaks.
+
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test fails by panicking"
+)]
+
+#[path = "common/record.rs"]
+mod record;
+
+use record::{Record, run_of};
+use sim::scenario::Scenario;
+use sim::summary::Summary;
+
+const LIFT: usize = 2;
+/// Weight of lift, shaft and 22 kg, N.
+const WEIGHT: f64 = (1.95 + 22.0) * 9.81;
+
+fn with_22_kg(faults: &[&str]) -> (Summary, Record) {
+    let mut scenario = Scenario::built_in("gate-22kg").unwrap();
+    scenario.cycles = 1;
+    run_of(scenario, faults, 5)
+}
+
+/// From nothing to the weight of 235 N within 30 ms: 8 N a sample.
+#[test]
+fn the_weight_is_taken_over_without_a_step() {
+    let (summary, record) = with_22_kg(&[]);
+    assert!(summary.completed);
+    let first = record
+        .truths
+        .iter()
+        .position(|it| it.plant.tau[LIFT] != 0.0);
+    let taken = &record.truths[first.unwrap() - 1..][..40];
+    let steps = taken
+        .windows(2)
+        .map(|two| (two[1].plant.tau[LIFT] - two[0].plant.tau[LIFT]).abs());
+    assert!(steps.fold(0.0, f64::max) < 1.2 * WEIGHT / 30.0);
+    let last = taken.last().unwrap();
+    assert!((last.plant.tau[LIFT] + WEIGHT).abs() < 0.02 * WEIGHT);
+    // Nor does it move meanwhile.
+    let sunk = last.plant.q[LIFT] - taken[0].plant.q[LIFT];
+    assert!(sunk.abs() < 1e-6, "{sunk}");
+}
+
+/// Whatever the arm does, the motor of the lift stops it, and holds it for as long as the brake does not.
+#[test]
+fn a_lift_whose_brake_is_stuck_open_is_held_when_the_arm_fails() {
+    for fault in [
+        "motor:elbow:dead@0.5s",
+        "motor:elbow:dip@0.5s..0.52s",
+        "motor:elbow:weak=0.2@0.45s",
+        "motor:shoulder:runaway@0.45s",
+        "encoder:elbow:stuck@0.45s",
+        "encoder:shoulder:reversed@0.45s",
+        "encoder:elbow:jump=0.3@0.45s",
+        "encoder:elbow:noise=0.01@0.45s",
+        "encoder:shoulder:slow=0.02@0.45s",
+    ] {
+        let (summary, record) = with_22_kg(&["brake:stuck-open@0.3s", fault]);
+        assert!(!summary.completed, "{fault}");
+        let told = summary.faults[0].time_s;
+        let after: Vec<_> = record
+            .truths
+            .iter()
+            .filter(|it| it.plant.t > told)
+            .collect();
+        // The way down from full speed, 0.7 m/s, as fast as the torque allows, and no more.
+        let way =
+            after.iter().map(|it| it.plant.q[LIFT]).fold(0.0, f64::max) - after[0].plant.q[LIFT];
+        assert!(way < 0.05, "{fault}: {way} m");
+        let rest = after.last().unwrap();
+        assert!(rest.plant.t > told + 1.0, "{fault}");
+        assert!(
+            (rest.plant.tau[LIFT] + WEIGHT).abs() < 0.1 * WEIGHT,
+            "{fault}"
+        );
+        assert!(rest.plant.qd[LIFT].abs() < 1e-3, "{fault}");
+        let arm = after.iter().filter(|it| it.plant.t > told + 0.2);
+        let pushes = arm.filter(|it| it.plant.tau[0] != 0.0 || it.plant.tau[1] != 0.0);
+        let runaway = fault.contains("runaway");
+        assert!(runaway || pushes.count() == 0, "{fault}");
+    }
+}
