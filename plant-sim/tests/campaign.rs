@@ -76,8 +76,8 @@ impl Bench {
         String::from_utf8(output.stdout).unwrap()
     }
 
-    /// Runs a part, which may hold cases that miss something, or not.
-    fn run(&self, shard: &str, out: &str, more: &[&str]) {
+    /// Runs a part, which may hold cases that miss something, or not; returns what is said of it.
+    fn run(&self, shard: &str, out: &str, more: &[&str]) -> (Option<i32>, String) {
         let arguments = ["run", "plan.jsonl", "--shard", shard, "--out", out];
         let output = self.try_it(&[&arguments[..], more].concat());
         assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
@@ -88,6 +88,7 @@ impl Bench {
             shown.contains(" cases run, ") && shown.contains(&file),
             "{shown}"
         );
+        (output.status.code(), shown.into_owned())
     }
 
     fn refused(&self, arguments: &[&str], why: &str) {
@@ -132,31 +133,27 @@ fn results_are_the_same_bytes_however_they_are_divided() {
 #[test]
 fn a_part_that_was_ended_anywhere_goes_on_to_the_same_bytes() {
     let bench = Bench::new();
-    bench.run("1/2", "out", &[]);
-    let file = "out/results-1-of-2.jsonl";
+    let (status, shown) = bench.run("0/2", "out", &[]);
+    assert_eq!(status, Some(1), "a rusty robot misses something");
+    let of_both = shown.split(" kept, ").nth(1).unwrap();
+    let file = "out/results-0-of-2.jsonl";
     let whole = bench.read(file);
     let lines: Vec<usize> = whole.match_indices('\n').map(|(at, _)| at).collect();
     let cuts = [0, 1, lines[0] - 1, lines[0], lines[0] + 1, lines[3] + 1];
     for cut in cuts.into_iter().chain([lines[5] - 7, whole.len() - 1]) {
         fs::remove_file(bench.path(file)).unwrap();
         fs::write(bench.path(&format!("{file}.partial")), &whole[..cut]).unwrap();
-        bench.run("1/2", "out", &["--resume"]);
+        // What was missed before it was ended is missed, too.
+        let (again, shown) = bench.run("0/2", "out", &["--resume"]);
+        assert_eq!(again, status, "cut at {cut}");
+        assert!(shown.ends_with(of_both), "cut at {cut}: {shown}");
         assert_eq!(bench.read(file), whole, "cut at {cut}");
         assert!(!bench.path(&format!("{file}.partial")).exists());
     }
-    // Complete results are left alone.
-    bench.call(
-        &[
-            "run",
-            "plan.jsonl",
-            "--shard",
-            "1/2",
-            "--out",
-            "out",
-            "--resume",
-        ],
-        0,
-    );
+    // Complete results are left alone, and judged.
+    let (again, shown) = bench.run("0/2", "out", &["--resume"]);
+    assert_eq!(again, status);
+    assert!(shown.starts_with("0 cases run, 12 kept, ") && shown.ends_with(of_both));
     assert_eq!(bench.read(file), whole);
 }
 

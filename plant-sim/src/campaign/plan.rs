@@ -14,6 +14,7 @@ use sim::setup::RunConfig;
 use trace::LogHash;
 
 use super::CampaignError;
+use super::shard::Shard;
 
 /// The first line of a plan.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -156,6 +157,19 @@ impl Plan {
             serde_json::from_str(&line)
                 .map_err(|error| CampaignError::wrong(&self.path, error.to_string()))
         }))
+    }
+
+    /// Those of them that belong to `shard`.
+    ///
+    /// # Errors
+    /// It can no longer be read.
+    pub fn cases_of(
+        &self,
+        shard: Shard,
+    ) -> Result<impl Iterator<Item = Result<Case, CampaignError>>, CampaignError> {
+        let is_of =
+            move |case: &Result<Case, _>| case.as_ref().map_or(true, |case| shard.has(case.case));
+        Ok(self.cases()?.filter(is_of))
     }
 
     /// The case of this number.

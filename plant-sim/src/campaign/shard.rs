@@ -94,18 +94,20 @@ pub struct Results {
     path: PathBuf,
 }
 
-/// What a shard finds in its folder.
-#[derive(Debug)]
-pub enum Beginning {
-    /// All of its results.
-    Complete,
-    /// Results up to this case, or none, and room for more.
-    After(Option<u64>, Results),
+/// Results that a shard finds in its folder.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Kept {
+    /// How many cases.
+    pub cases: u64,
+    /// How many of them missed a requirement.
+    pub missed: u64,
+    /// Length of their whole lines.
+    length: u64,
 }
 
 impl Results {
-    /// The file of results in `folder`, which is created if missing. With `resume` the results there are kept, otherwise they
-    /// are replaced.
+    /// The results in `folder`, which is created if missing, and the file for the rest, `None` if nothing is left. With `resume`
+    /// the results there are kept, otherwise they are replaced.
     ///
     /// # Errors
     /// Another process writes them, they belong to another plan, or the folder does not accept them.
@@ -113,14 +115,14 @@ impl Results {
         folder: &Path,
         header: &ShardHeader,
         resume: bool,
-    ) -> Result<Beginning, CampaignError> {
+    ) -> Result<(Kept, Option<Self>), CampaignError> {
         refuse_tilde(folder)?;
         fs::create_dir_all(folder).map_err(CampaignError::write(folder))?;
         let path = folder.join(header.shard.file());
         let partial = partial_of(&path);
         if resume && path.exists() {
-            check(&path, header, &mut reader(&path)?)?;
-            return Ok(Beginning::Complete);
+            let file = File::open(&path).map_err(CampaignError::read(&path))?;
+            return Ok((kept(&path, header, &file)?, None));
         }
         let mut file = OpenOptions::new()
             .read(true)
@@ -135,15 +137,15 @@ impl Results {
             }
             .into());
         }
-        let (last, length) = if resume {
+        let kept = if resume {
             kept(&partial, header, &file)?
         } else {
-            (None, 0)
+            Kept::default()
         };
         let first = plan::line(header) + "\n";
-        file.set_len(length)
-            .and_then(|()| file.seek(SeekFrom::Start(length)))
-            .and_then(|_| match length {
+        file.set_len(kept.length)
+            .and_then(|()| file.seek(SeekFrom::Start(kept.length)))
+            .and_then(|_| match kept.length {
                 0 => file.write_all(first.as_bytes()),
                 _ => Ok(()),
             })
@@ -153,7 +155,7 @@ impl Results {
             partial,
             path,
         };
-        Ok(Beginning::After(last, results))
+        Ok((kept, Some(results)))
     }
 
     /// Appends whole lines.
@@ -184,15 +186,11 @@ fn partial_of(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// The last case in an incomplete file, and the length of its whole lines.
-fn kept(
-    path: &Path,
-    header: &ShardHeader,
-    file: &File,
-) -> Result<(Option<u64>, u64), CampaignError> {
+/// The results in a file that may be incomplete.
+fn kept(path: &Path, header: &ShardHeader, file: &File) -> Result<Kept, CampaignError> {
     let mut reader = BufReader::new(file);
     let mut line = String::new();
-    let (mut last, mut length) = (None, 0);
+    let mut kept = Kept::default();
     loop {
         line.clear();
         // What was cut short in the middle of a character is no line either.
@@ -201,14 +199,15 @@ fn kept(
             other => other.map_err(CampaignError::read(path))?,
         };
         if !line.ends_with('\n') || read == 0 {
-            return Ok((last, length));
+            return Ok(kept);
         }
-        if length == 0 {
+        if kept.length == 0 {
             same(path, header, &line)?;
         } else {
-            last = Some(outcome(path, &line)?.case.case);
+            kept.cases += 1;
+            kept.missed += u64::from(!outcome(path, &line)?.verdict.missed.is_empty());
         }
-        length += read as u64;
+        kept.length += read as u64;
     }
 }
 
@@ -244,15 +243,6 @@ pub fn reader(path: &Path) -> Result<BufReader<File>, CampaignError> {
     File::open(path)
         .map(BufReader::new)
         .map_err(CampaignError::read(path))
-}
-
-fn check(
-    path: &Path,
-    expected: &ShardHeader,
-    reader: &mut BufReader<File>,
-) -> Result<(), CampaignError> {
-    let found = header(path, reader)?;
-    agree(path, expected, &found)
 }
 
 fn same(path: &Path, expected: &ShardHeader, line: &str) -> Result<(), CampaignError> {

@@ -169,15 +169,17 @@ fn work(args: &RunArgs) -> Result<(), Failure> {
     let done = work::work(&plan, shard, jobs, args.resume, &args.out)?;
     let out = args.out.display();
     show(&format!(
-        "{} cases run, {} missed a requirement; the results are in {}: plant-sim campaign merge {out} | plant-sim campaign report -\n",
-        done.cases,
+        "{} cases run, {} kept, {} missed a requirement; the results are in {}: plant-sim campaign merge {out} | plant-sim campaign report -\n",
+        done.run,
+        done.kept,
         done.missed,
         args.out.join(shard.file()).display()
     ))?;
     if done.missed > 0 {
         return Err(Failure::failed(format!(
             "{} of {} cases missed a requirement",
-            done.missed, done.cases
+            done.missed,
+            done.run + done.kept
         )));
     }
     Ok(())
