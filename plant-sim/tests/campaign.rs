@@ -157,6 +157,87 @@ fn a_part_that_was_ended_anywhere_goes_on_to_the_same_bytes() {
     assert_eq!(bench.read(file), whole);
 }
 
+/// What a disk, an editor or a copy that was cut off makes of results is found, and run again.
+#[test]
+fn damaged_results_are_missing_and_run_again() {
+    let bench = Bench::new();
+    let (status, _) = bench.run("0/2", "out", &[]);
+    bench.run("1/2", "out", &[]);
+    let merged = bench.call(&["merge", "out"], 0).stdout;
+    let file = "out/results-0-of-2.jsonl";
+    let whole = bench.read(file);
+    let lines: Vec<&str> = whole.split_inclusive('\n').collect();
+    // Lines in this order, counted from 0.
+    let of = |order: &[usize]| order.iter().map(|at| lines[*at]).collect::<String>();
+    let rest: Vec<usize> = (4..lines.len()).collect();
+    let tailed = |head: &[usize]| of(&[head, &rest].concat());
+    let spoiled = |at: usize, by: &str| {
+        let mut lines: Vec<String> = lines.iter().map(|&line| line.into()).collect();
+        lines[at].replace_range(7..10, by);
+        lines.concat()
+    };
+    for (damaged, why) in [
+        (String::new(), "line 1 is not that of results of part 0/2"),
+        (
+            spoiled(0, "\0\0\0"),
+            "line 1 is not that of results of part 0/2",
+        ),
+        (
+            whole.replacen("\"part\":0", "\"part\":1", 1),
+            "line 1 is not that of results of part 0/2",
+        ),
+        (
+            whole[..whole.len() - 30].into(),
+            "line 13 is no result of a case",
+        ),
+        (
+            whole[..whole.len() - 1].into(),
+            "line 13 is no result of a case",
+        ),
+        (of(&[0, 1, 2]), "it ends before case 4"),
+        (tailed(&[0, 1, 2]), "line 4 is case 6, where case 4 belongs"),
+        (
+            tailed(&[0, 1, 2, 2, 3]),
+            "line 4 is case 2, where case 4 belongs",
+        ),
+        (
+            tailed(&[0, 1, 3, 2]),
+            "line 3 is case 4, where case 2 belongs",
+        ),
+        (spoiled(3, "x"), "line 4 is no result of a case"),
+        (
+            format!("{whole}{}", lines[3]),
+            "line 14 is case 4, after the last",
+        ),
+        (format!("{whole}\n"), "line 14 is no result of a case"),
+    ] {
+        for name in [file, "out/results-0-of-2.jsonl.partial"] {
+            fs::remove_file(bench.path(file)).unwrap();
+            fs::write(bench.path(name), &damaged).unwrap();
+            if name == file {
+                let missing = bench.call(&["missing", "out"], 0);
+                assert_eq!(missing.stdout, b"0\n", "{why}");
+                let said = String::from_utf8_lossy(&missing.stderr);
+                assert!(
+                    said.contains(why) && said.contains("--shard 0/2 --resume --out out"),
+                    "{why}: {said}"
+                );
+                bench.refused(&["merge", "out"], why);
+            }
+            assert_eq!(bench.run("0/2", "out", &["--resume"]).0, status, "{why}");
+            assert_eq!(bench.read(file), whole, "{why}");
+            assert!(!bench.path("out/results-0-of-2.jsonl.partial").exists());
+            assert_eq!(bench.call(&["missing", "out"], 0).stdout, b"\n", "{why}");
+        }
+    }
+    fs::write(bench.path(file), b"\xff\xfe\n").unwrap();
+    assert_eq!(bench.call(&["missing", "out"], 0).stdout, b"0\n");
+    bench.run("0/2", "out", &["--resume"]);
+    assert_eq!(bench.call(&["merge", "out"], 0).stdout, merged);
+    fs::copy(bench.path(file), bench.path("out/results-copy.jsonl")).unwrap();
+    bench.refused(&["merge", "out"], "results are called results-K-of-N.jsonl");
+}
+
 #[test]
 fn what_is_missing_or_there_twice_is_refused_by_number() {
     let bench = Bench::new();

@@ -41,7 +41,7 @@ pub fn work(
     folder: &Path,
 ) -> Result<Done, CampaignError> {
     let header = ShardHeader::new(plan, shard);
-    let (kept, results) = Results::open(folder, &header, resume)?;
+    let (kept, results) = Results::open(folder, plan, &header, resume)?;
     let mut done = Done {
         run: 0,
         kept: kept.cases,
