@@ -186,7 +186,7 @@ impl Judge {
                 Some((_, cause)) => Some(cause.name().into()),
                 None => self.cut.map(|_| "drives".into()),
             },
-            detection_ms: at.and_then(since),
+            detection_ms: at.filter(|_| self.onset < Instant::MAX).and_then(since),
             standstill_ms: stopped.then_some(self.moving.max(onset)).and_then(since),
             distance_mm: stopped.then(|| round(self.distance * 1e3)),
             energy_j: (self.onset < Instant::MAX).then(|| round(self.energy)),
