@@ -296,11 +296,11 @@ fn a_plan_that_was_changed_or_is_none_is_refused() {
     for (wrong, why) in [
         (
             plan.replace("feedback:corrupt", "feedback:loss"),
-            "not as they were written",
+            "plan.jsonl: the cases are here, but not as they were written; write it again",
         ),
         (
             plan.lines().next().unwrap().to_owned(),
-            "the plan has 0 cases of 24",
+            "plan.jsonl: the plan has 0 cases of 24; write it again",
         ),
         (String::new(), "not that of a plan"),
         ("{}".to_owned(), "not that of a plan"),

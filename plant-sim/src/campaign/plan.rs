@@ -121,11 +121,16 @@ impl Plan {
             hash.add(&line.map_err(CampaignError::read(path))?);
             count += 1;
         }
-        if count != header.cases || hash.finish() != header.plan {
-            return Err(wrong(format!(
-                "the plan has {count} cases of {}, or they are not as they were written; write it again: plant-sim campaign plan",
-                header.cases
-            )));
+        let refuse = |what: &str| {
+            Err(wrong(format!(
+                "{what}; write it again: plant-sim campaign plan"
+            )))
+        };
+        if count != header.cases {
+            return refuse(&format!("the plan has {count} cases of {}", header.cases));
+        }
+        if hash.finish() != header.plan {
+            return refuse("the cases are here, but not as they were written");
         }
         let scenarios = header.situations.iter().map(|scene| {
             let scenario = Scenario::parse(&scene.scenario, &scene.name);
