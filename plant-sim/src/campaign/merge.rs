@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 use sim::campaign::tally::{Outcome, Tally};
 
 use super::CampaignError;
-use super::plan;
+use super::plan::{self, Hash};
 use super::results::Reader;
-use super::shard::Shard;
+use super::shard::{Shard, ShardHeader};
 use crate::say;
 
 /// The first line of merged results.
@@ -36,16 +36,12 @@ pub fn merge(folders: &[PathBuf], sink: &mut impl Write) -> Result<(), CampaignE
     let Some(first) = sources.first() else {
         return Err(nothing(folders));
     };
-    let (header, path) = (first.header(), first.path());
-    let merged = Merged {
-        plan: header.plan.clone(),
-        cases: header.cases,
-        build: header.build.clone(),
-    };
+    let (header, path) = (first.header().clone(), first.path());
     for other in &sources {
-        let what = if other.header().plan != merged.plan {
+        let found = other.header();
+        let what = if !found.is_of_plan_of(&header) {
             "these are results of another plan than"
-        } else if other.header().build != merged.build {
+        } else if found.build != header.build {
             "these are results of another build of the program than"
         } else {
             continue;
@@ -54,23 +50,33 @@ pub fn merge(folders: &[PathBuf], sink: &mut impl Write) -> Result<(), CampaignE
         return Err(CampaignError::wrong(other.path(), what));
     }
     let failed = CampaignError::write(Path::new("standard output"));
-    put_together(&merged, sources, sink, failed)
+    put_together(header, sources, sink, failed)
 }
 
 fn put_together(
-    merged: &Merged,
+    header: ShardHeader,
     mut sources: Vec<Reader>,
     sink: &mut impl Write,
     failed: impl FnOnce(io::Error) -> CampaignError,
 ) -> Result<(), CampaignError> {
-    let mut written = writeln!(sink, "{}", plan::line(merged));
-    // The next case of each source, the lowest first.
+    let mut hash = Hash::new(&header.situations);
+    let merged = Merged {
+        plan: header.plan,
+        cases: header.cases,
+        build: header.build,
+    };
+    let mut written = writeln!(sink, "{}", plan::line(&merged));
+    // The next case of each source, the lowest first, and its line in the plan.
+    let next = |index, source: &mut Reader| {
+        let of = |one: Outcome| Reverse((one.case.case, index, plan::line(&one.case)));
+        source.advance().map(|outcome| outcome.map(of))
+    };
     let mut heap = BinaryHeap::new();
     for (index, source) in sources.iter_mut().enumerate() {
-        heap.extend(source.advance()?.map(|one| Reverse((one.case.case, index))));
+        heap.extend(next(index, source)?);
     }
     let mut expected = 0;
-    while let Some(Reverse((case, index))) = heap.pop() {
+    while let Some(Reverse((case, index, planned))) = heap.pop() {
         let source = &mut sources[index];
         if case != expected {
             let what = if case < expected {
@@ -81,14 +87,21 @@ fn put_together(
             return Err(CampaignError::wrong(source.path(), what));
         }
         expected += 1;
+        hash.add(&planned);
         written = written.and_then(|()| sink.write_all(source.line()));
-        heap.extend(source.advance()?.map(|one| Reverse((one.case.case, index))));
+        heap.extend(next(index, source)?);
     }
-    if let (true, Some(source)) = (expected < merged.cases, sources.first()) {
-        let what = format!(
+    let what = if expected < merged.cases {
+        format!(
             "case {expected} of {} is in no file; {RUN_IT}",
             merged.cases
-        );
+        )
+    } else if hash.finish() != merged.plan {
+        NOT_AS_PLANNED.into()
+    } else {
+        String::new()
+    };
+    if let (false, Some(source)) = (what.is_empty(), sources.first()) {
         return Err(CampaignError::wrong(source.path(), what));
     }
     match written.and_then(|()| sink.flush()) {
@@ -98,6 +111,8 @@ fn put_together(
 }
 
 const RUN_IT: &str = "plant-sim campaign missing lists the shards to run";
+const NOT_AS_PLANNED: &str = "a case here, or in a file merged with it, is not as the plan has it; plant-sim campaign run PLAN \
+                              --shard K/N --resume finds it and runs it again, if it is given each part";
 
 /// Files of results in these folders, and whose results they should have.
 fn files(folders: &[PathBuf]) -> Result<BTreeMap<PathBuf, Shard>, CampaignError> {

@@ -80,21 +80,22 @@ pub(super) fn line(value: &impl Serialize) -> String {
 }
 
 /// The hash of a plan.
-struct Hash(Sha256);
+pub(super) struct Hash(Sha256);
 
 impl Hash {
-    fn new(scenes: &[Scene]) -> Self {
+    pub(super) fn new(scenes: &[Scene]) -> Self {
         let mut hash = Self(Sha256::new());
         hash.add(&line(&scenes));
         hash
     }
 
-    fn add(&mut self, line: &str) {
+    /// Adds the line of a case.
+    pub(super) fn add(&mut self, line: &str) {
         self.0.update(line);
         self.0.update("\n");
     }
 
-    fn finish(self) -> String {
+    pub(super) fn finish(self) -> String {
         LogHash(self.0.finalize().into()).to_string()
     }
 }

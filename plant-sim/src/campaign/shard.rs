@@ -12,7 +12,7 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::plan::{self, Plan};
+use super::plan::{self, Plan, Scene};
 use super::results::Reader;
 use super::{CampaignError, undamaged};
 use crate::output::{OutputError, refuse_tilde};
@@ -83,6 +83,9 @@ pub struct ShardHeader {
     pub plan: String,
     /// Number of its cases.
     pub cases: u64,
+    /// Its situations, without which the hash cannot be worked out again.
+    #[serde(default)]
+    pub situations: Vec<Scene>,
     /// Build of the program: results of two builds are not those of one campaign.
     pub build: String,
     /// Which part of the plan is here.
@@ -96,9 +99,15 @@ impl ShardHeader {
         Self {
             plan: header.plan.clone(),
             cases: header.cases,
+            situations: header.situations.clone(),
             build: env!("COMMIT").into(),
             shard,
         }
+    }
+
+    /// Whether both are results of one plan.
+    pub fn is_of_plan_of(&self, other: &Self) -> bool {
+        self.plan == other.plan && self.cases == other.cases && self.situations == other.situations
     }
 }
 
