@@ -76,8 +76,8 @@ impl Bench {
         String::from_utf8(output.stdout).unwrap()
     }
 
-    /// Runs a part, which may hold cases that miss something, or not.
-    fn run(&self, shard: &str, out: &str, more: &[&str]) {
+    /// Runs a part, which may hold cases that miss something, or not; returns what is said of it.
+    fn run(&self, shard: &str, out: &str, more: &[&str]) -> (Option<i32>, String) {
         let arguments = ["run", "plan.jsonl", "--shard", shard, "--out", out];
         let output = self.try_it(&[&arguments[..], more].concat());
         assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
@@ -88,6 +88,7 @@ impl Bench {
             shown.contains(" cases run, ") && shown.contains(&file),
             "{shown}"
         );
+        (output.status.code(), shown.into_owned())
     }
 
     fn refused(&self, arguments: &[&str], why: &str) {
@@ -132,32 +133,158 @@ fn results_are_the_same_bytes_however_they_are_divided() {
 #[test]
 fn a_part_that_was_ended_anywhere_goes_on_to_the_same_bytes() {
     let bench = Bench::new();
-    bench.run("1/2", "out", &[]);
-    let file = "out/results-1-of-2.jsonl";
+    let (status, shown) = bench.run("0/2", "out", &[]);
+    assert_eq!(status, Some(1), "a rusty robot misses something");
+    let of_both = shown.split(" kept, ").nth(1).unwrap();
+    let file = "out/results-0-of-2.jsonl";
     let whole = bench.read(file);
     let lines: Vec<usize> = whole.match_indices('\n').map(|(at, _)| at).collect();
     let cuts = [0, 1, lines[0] - 1, lines[0], lines[0] + 1, lines[3] + 1];
     for cut in cuts.into_iter().chain([lines[5] - 7, whole.len() - 1]) {
         fs::remove_file(bench.path(file)).unwrap();
         fs::write(bench.path(&format!("{file}.partial")), &whole[..cut]).unwrap();
-        bench.run("1/2", "out", &["--resume"]);
+        // What was missed before it was ended is missed, too.
+        let (again, shown) = bench.run("0/2", "out", &["--resume"]);
+        assert_eq!(again, status, "cut at {cut}");
+        assert!(shown.ends_with(of_both), "cut at {cut}: {shown}");
         assert_eq!(bench.read(file), whole, "cut at {cut}");
         assert!(!bench.path(&format!("{file}.partial")).exists());
     }
-    // Complete results are left alone.
-    bench.call(
-        &[
-            "run",
-            "plan.jsonl",
-            "--shard",
-            "1/2",
-            "--out",
-            "out",
-            "--resume",
-        ],
-        0,
-    );
+    // Complete results are left alone, and judged.
+    let (again, shown) = bench.run("0/2", "out", &["--resume"]);
+    assert_eq!(again, status);
+    assert!(shown.starts_with("0 cases run, 12 kept, ") && shown.ends_with(of_both));
     assert_eq!(bench.read(file), whole);
+}
+
+/// What a disk, an editor or a copy that was cut off makes of results is found, and run again.
+#[test]
+fn damaged_results_are_missing_and_run_again() {
+    let bench = Bench::new();
+    let (status, _) = bench.run("0/2", "out", &[]);
+    bench.run("1/2", "out", &[]);
+    let merged = bench.call(&["merge", "out"], 0).stdout;
+    let file = "out/results-0-of-2.jsonl";
+    let whole = bench.read(file);
+    let lines: Vec<&str> = whole.split_inclusive('\n').collect();
+    // Lines in this order, counted from 0.
+    let of = |order: &[usize]| order.iter().map(|at| lines[*at]).collect::<String>();
+    let rest: Vec<usize> = (4..lines.len()).collect();
+    let tailed = |head: &[usize]| of(&[head, &rest].concat());
+    let spoiled = |at: usize, by: &str| {
+        let mut lines: Vec<String> = lines.iter().map(|&line| line.into()).collect();
+        lines[at].replace_range(7..10, by);
+        lines.concat()
+    };
+    for (damaged, why) in [
+        (String::new(), "line 1 is not that of results of part 0/2"),
+        (
+            spoiled(0, "\0\0\0"),
+            "line 1 is not that of results of part 0/2",
+        ),
+        (
+            whole.replacen("\"part\":0", "\"part\":1", 1),
+            "line 1 is not that of results of part 0/2",
+        ),
+        (
+            whole[..whole.len() - 30].into(),
+            "line 13 is no result of a case",
+        ),
+        (
+            whole[..whole.len() - 1].into(),
+            "line 13 is no result of a case",
+        ),
+        (of(&[0, 1, 2]), "it ends before case 4"),
+        (tailed(&[0, 1, 2]), "line 4 is case 6, where case 4 belongs"),
+        (
+            tailed(&[0, 1, 2, 2, 3]),
+            "line 4 is case 2, where case 4 belongs",
+        ),
+        (
+            tailed(&[0, 1, 3, 2]),
+            "line 3 is case 4, where case 2 belongs",
+        ),
+        (spoiled(3, "x"), "line 4 is no result of a case"),
+        (
+            format!("{whole}{}", lines[3]),
+            "line 14 is case 4, after the last",
+        ),
+        (format!("{whole}\n"), "line 14 is no result of a case"),
+    ] {
+        for name in [file, "out/results-0-of-2.jsonl.partial"] {
+            fs::remove_file(bench.path(file)).unwrap();
+            fs::write(bench.path(name), &damaged).unwrap();
+            if name == file {
+                let missing = bench.call(&["missing", "out"], 0);
+                assert_eq!(missing.stdout, b"0\n", "{why}");
+                let said = String::from_utf8_lossy(&missing.stderr);
+                assert!(
+                    said.contains(why) && said.contains("--shard 0/2 --resume --out out"),
+                    "{why}: {said}"
+                );
+                bench.refused(&["merge", "out"], why);
+            }
+            assert_eq!(bench.run("0/2", "out", &["--resume"]).0, status, "{why}");
+            assert_eq!(bench.read(file), whole, "{why}");
+            assert!(!bench.path("out/results-0-of-2.jsonl.partial").exists());
+            assert_eq!(bench.call(&["missing", "out"], 0).stdout, b"\n", "{why}");
+        }
+    }
+    fs::write(bench.path(file), b"\xff\xfe\n").unwrap();
+    assert_eq!(bench.call(&["missing", "out"], 0).stdout, b"0\n");
+    bench.run("0/2", "out", &["--resume"]);
+    assert_eq!(bench.call(&["merge", "out"], 0).stdout, merged);
+    fs::copy(bench.path(file), bench.path("out/results-copy.jsonl")).unwrap();
+    bench.refused(&["merge", "out"], "results are called results-K-of-N.jsonl");
+}
+
+/// Lines that are whole, and say what is not so.
+#[test]
+fn altered_results_are_not_merged() {
+    let bench = Bench::new();
+    bench.run("0/2", "out", &[]);
+    bench.run("1/2", "out", &[]);
+    let merged = bench.call(&["merge", "out"], 0).stdout;
+    let file = "out/results-0-of-2.jsonl";
+    let whole = bench.read(file);
+    for (from, to, why) in [
+        ("\"seed\":2}", "\"seed\":1946}", "is not as the plan has it"),
+        (
+            "duplicate@525ms",
+            "duplicate@526ms",
+            "is not as the plan has it",
+        ),
+        (
+            "\"missed\":[]",
+            "\"missed\":[\"no-alarm\"]",
+            "line 2 is no result of a case",
+        ),
+        (
+            "\"part\":0,\"of\":2",
+            "\"part\":7,\"of\":2",
+            "line 1 is not that of results of part 0/2",
+        ),
+        (
+            "\"part\":0,\"of\":2",
+            "\"part\":0,\"of\":0",
+            "line 1 is not that of results of part 0/2",
+        ),
+    ] {
+        let altered = whole.replacen(from, to, 1);
+        assert!(altered != whole, "{from}");
+        fs::write(bench.path(file), altered).unwrap();
+        bench.refused(&["merge", "out"], why);
+        bench.run("0/2", "out", &["--resume"]);
+        assert_eq!(bench.call(&["merge", "out"], 0).stdout, merged, "{why}");
+    }
+    // A plan of another length is another plan, even where this part has as many cases of it.
+    for (part, cases) in [(0, "\"cases\":23"), (1, "\"cases\":25")] {
+        let file = bench.path(&format!("out/results-{part}-of-2.jsonl"));
+        let whole = fs::read_to_string(&file).unwrap();
+        fs::write(&file, whole.replacen("\"cases\":24", cases, 1)).unwrap();
+        bench.refused(&["merge", "out"], "results of another plan than");
+        fs::write(&file, whole).unwrap();
+    }
 }
 
 #[test]
@@ -197,18 +324,8 @@ fn results_of_another_plan_do_not_belong_here() {
         "results of another plan than",
     );
     fs::rename(bench.path("first"), bench.path("out")).unwrap();
-    bench.refused(
-        &[
-            "run",
-            "plan.jsonl",
-            "--shard",
-            "0/2",
-            "--out",
-            "out",
-            "--resume",
-        ],
-        "results of another plan",
-    );
+    let again = "run plan.jsonl --shard 0/2 --out out --resume".split(' ');
+    bench.refused(&again.collect::<Vec<_>>(), "results of another plan");
 }
 
 #[test]
@@ -218,11 +335,11 @@ fn a_plan_that_was_changed_or_is_none_is_refused() {
     for (wrong, why) in [
         (
             plan.replace("feedback:corrupt", "feedback:loss"),
-            "not as they were written",
+            "plan.jsonl: the cases are here, but not as they were written; write it again",
         ),
         (
             plan.lines().next().unwrap().to_owned(),
-            "the plan has 0 cases of 24",
+            "plan.jsonl: the plan has 0 cases of 24; write it again",
         ),
         (String::new(), "not that of a plan"),
         ("{}".to_owned(), "not that of a plan"),

@@ -42,6 +42,23 @@ fn a_fault_reads_as_a_sentence_with_axis_and_unit() {
             of_axis(Cause::OverSpeed, Tool, 0.262, 0.25),
             "over speed, tool: 0.26 m/s, limit 0.25 m/s",
         ),
+        // More digits only where it takes them to tell value and limit apart.
+        (
+            of_axis(Cause::OverSpeed, Tool, 0.2523, 0.25),
+            "over speed, tool: 0.252 m/s, limit 0.250 m/s",
+        ),
+        (
+            of_axis(Cause::OverSpeed, Tool, 0.250_02, 0.25),
+            "over speed, tool: 0.25002 m/s, limit 0.25000 m/s",
+        ),
+        (
+            of_axis(Cause::FollowingError, Lift, -0.002_01, 0.002),
+            "following error, axis 3 (lift): -2.01 mm, limit 2.00 mm",
+        ),
+        (
+            Fault::value(Cause::Overrun, 5.0, 5.0),
+            "overrun: 5 samples in a row, limit 5 samples in a row",
+        ),
         (
             of_axis(Cause::SoftLimit, Wrist, 7.1, 7.0313),
             "soft limit, axis 4 (wrist): 7.100 rad, limit 7.031 rad",

@@ -327,6 +327,29 @@ fn a_verdict_gives_the_consequence() {
     assert_eq!(survived.distance_mm, None);
 }
 
+/// Where nothing begins, nothing can be counted from its beginning.
+#[test]
+fn a_stop_without_a_fault_has_no_time_of_detection() {
+    let verdict = judge("none", 2.0, Some(Defect::FalseReport));
+    assert_eq!(verdict.detected.as_deref(), Some("corrupted"));
+    assert!(verdict.missed.contains(&Requirement::NoFalseAlarm));
+    assert_eq!(verdict.detection_ms, None);
+    assert_eq!(verdict.standstill_ms, None);
+}
+
+/// What is told at 0.5 s is not the fault of 0.7 s, whatever that may lead to.
+#[test]
+fn what_is_told_before_the_fault_begins_is_a_false_alarm() {
+    for fault in ["motor:elbow:dead@0.7s", "brake:slow=0.02@0.7s"] {
+        let sound = judge(fault, 2.0, None);
+        assert!(!sound.missed.contains(&Requirement::NoFalseAlarm));
+        let verdict = judge(fault, 2.0, Some(Defect::FalseReport));
+        assert_eq!(verdict.detected.as_deref(), Some("corrupted"));
+        assert!(verdict.missed.contains(&Requirement::NoFalseAlarm));
+        assert_eq!(verdict.detection_ms, None);
+    }
+}
+
 /// Worked out by hand for 22 kg, from rest: 23.95 kg and 8.21 kg of rotor, 860 N and 235 N of weight. 8 ms at 34.0 m/s2 are 1.1 mm
 /// and 0.27 m/s; 30 ms of free fall from there 12.6 mm and 0.57 m/s; to stop that at 19.4 m/s2 takes 8.3 mm. From 1 m/s:
 /// 9.1 mm, 42.6 mm and 63.1 mm. The stretched arm has 39.0 kg m2 about the shoulder, rotor and load included; 7.68 rad/s are gone after

@@ -1,19 +1,20 @@
 //! Results of shards put together, in the order of the cases: the same bytes whatever the sharding.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::fmt::Write as _;
 use std::fs;
-use std::fs::File;
 use std::io::{self, BufRead as _, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sim::campaign::tally::Tally;
+use sim::campaign::tally::{Outcome, Tally};
 
 use super::CampaignError;
-use super::plan;
-use super::shard::{self, Shard, ShardHeader};
+use super::plan::{self, Hash};
+use super::results::Reader;
+use super::shard::{Shard, ShardHeader};
+use crate::say;
 
 /// The first line of merged results.
 #[derive(Debug, Deserialize, Serialize)]
@@ -29,47 +30,53 @@ struct Merged {
 /// Results are missing or there twice, or are not of one plan and one build of the program.
 pub fn merge(folders: &[PathBuf], sink: &mut impl Write) -> Result<(), CampaignError> {
     let mut sources = Vec::new();
-    for path in files(folders)? {
-        sources.push(Source::open(path)?);
+    for (path, shard) in files(folders)? {
+        sources.push(Reader::open(&path, shard)?);
     }
     let Some(first) = sources.first() else {
         return Err(nothing(folders));
     };
-    let Source { header, path, .. } = first;
-    let merged = Merged {
-        plan: header.plan.clone(),
-        cases: header.cases,
-        build: header.build.clone(),
-    };
+    let (header, path) = (first.header().clone(), first.path());
     for other in &sources {
-        let what = if other.header.plan != merged.plan {
+        let found = other.header();
+        let what = if !found.is_of_plan_of(&header) {
             "these are results of another plan than"
-        } else if other.header.build != merged.build {
+        } else if found.build != header.build {
             "these are results of another build of the program than"
         } else {
             continue;
         };
         let what = format!("{what} {}; merge those of one only", path.display());
-        return Err(CampaignError::wrong(&other.path, what));
+        return Err(CampaignError::wrong(other.path(), what));
     }
     let failed = CampaignError::write(Path::new("standard output"));
-    put_together(&merged, sources, sink, failed)
+    put_together(header, sources, sink, failed)
 }
 
 fn put_together(
-    merged: &Merged,
-    mut sources: Vec<Source>,
+    header: ShardHeader,
+    mut sources: Vec<Reader>,
     sink: &mut impl Write,
     failed: impl FnOnce(io::Error) -> CampaignError,
 ) -> Result<(), CampaignError> {
-    let mut written = writeln!(sink, "{}", plan::line(merged));
-    // The next case of each source, the lowest first.
+    let mut hash = Hash::new(&header.situations);
+    let merged = Merged {
+        plan: header.plan,
+        cases: header.cases,
+        build: header.build,
+    };
+    let mut written = writeln!(sink, "{}", plan::line(&merged));
+    // The next case of each source, the lowest first, and its line in the plan.
+    let next = |index, source: &mut Reader| {
+        let of = |one: Outcome| Reverse((one.case.case, index, plan::line(&one.case)));
+        source.advance().map(|outcome| outcome.map(of))
+    };
     let mut heap = BinaryHeap::new();
     for (index, source) in sources.iter_mut().enumerate() {
-        heap.extend(source.advance()?.map(|case| Reverse((case, index))));
+        heap.extend(next(index, source)?);
     }
     let mut expected = 0;
-    while let Some(Reverse((case, index))) = heap.pop() {
+    while let Some(Reverse((case, index, planned))) = heap.pop() {
         let source = &mut sources[index];
         if case != expected {
             let what = if case < expected {
@@ -77,18 +84,25 @@ fn put_together(
             } else {
                 format!("case {expected} is missing before case {case}; {RUN_IT}")
             };
-            return Err(CampaignError::wrong(&source.path, what));
+            return Err(CampaignError::wrong(source.path(), what));
         }
         expected += 1;
-        written = written.and_then(|()| sink.write_all(source.line.as_bytes()));
-        heap.extend(source.advance()?.map(|case| Reverse((case, index))));
+        hash.add(&planned);
+        written = written.and_then(|()| sink.write_all(source.line()));
+        heap.extend(next(index, source)?);
     }
-    if let (true, Some(source)) = (expected < merged.cases, sources.first()) {
-        let what = format!(
+    let what = if expected < merged.cases {
+        format!(
             "case {expected} of {} is in no file; {RUN_IT}",
             merged.cases
-        );
-        return Err(CampaignError::wrong(&source.path, what));
+        )
+    } else if hash.finish() != merged.plan {
+        NOT_AS_PLANNED.into()
+    } else {
+        String::new()
+    };
+    if let (false, Some(source)) = (what.is_empty(), sources.first()) {
+        return Err(CampaignError::wrong(source.path(), what));
     }
     match written.and_then(|()| sink.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(failed(error)),
@@ -97,59 +111,24 @@ fn put_together(
 }
 
 const RUN_IT: &str = "plant-sim campaign missing lists the shards to run";
+const NOT_AS_PLANNED: &str = "a case here, or in a file merged with it, is not as the plan has it; plant-sim campaign run PLAN \
+                              --shard K/N --resume finds it and runs it again, if it is given each part";
 
-/// A file of results that is being read.
-struct Source {
-    path: PathBuf,
-    header: ShardHeader,
-    reader: BufReader<File>,
-    line: String,
-}
-
-impl Source {
-    fn open(path: PathBuf) -> Result<Self, CampaignError> {
-        let mut reader = shard::reader(&path)?;
-        let header = shard::header(&path, &mut reader)?;
-        Ok(Self {
-            path,
-            header,
-            reader,
-            line: String::new(),
-        })
-    }
-
-    /// Reads the next line; returns the number of its case.
-    fn advance(&mut self) -> Result<Option<u64>, CampaignError> {
-        #[derive(Deserialize)]
-        struct Line {
-            case: Number,
-        }
-        #[derive(Deserialize)]
-        struct Number {
-            case: u64,
-        }
-        self.line.clear();
-        let read = self.reader.read_line(&mut self.line);
-        if read.map_err(CampaignError::read(&self.path))? == 0 {
-            return Ok(None);
-        }
-        let line: Result<Line, _> = serde_json::from_str(&self.line);
-        let line = line.map_err(|error| {
-            CampaignError::wrong(&self.path, format!("{error}: this is no result of a case"))
-        })?;
-        Ok(Some(line.case.case))
-    }
-}
-
-/// Complete files of results in these folders.
-fn files(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, CampaignError> {
-    let mut files = BTreeSet::new();
+/// Files of results in these folders, and whose results they should have.
+fn files(folders: &[PathBuf]) -> Result<BTreeMap<PathBuf, Shard>, CampaignError> {
+    let mut files = BTreeMap::new();
     for folder in folders {
         for entry in fs::read_dir(folder).map_err(CampaignError::read(folder))? {
             let path = entry.map_err(CampaignError::read(folder))?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             if name.starts_with("results-") && name.ends_with(".jsonl") {
-                files.insert(path);
+                let shard = Shard::of_file(&name).ok_or_else(|| {
+                    CampaignError::wrong(
+                        &path,
+                        "results are called results-K-of-N.jsonl, with K from 0 to N-1",
+                    )
+                })?;
+                files.insert(path, shard);
             }
         }
     }
@@ -164,26 +143,38 @@ fn nothing(folders: &[PathBuf]) -> CampaignError {
     )
 }
 
-/// Shards without complete results, as a job array takes them: `1,3-5`; empty where nothing is missing.
+/// Shards without complete and valid results, as a job array takes them: `1,3-5`; empty where nothing is missing.
 ///
 /// # Errors
-/// No shard is complete, so that their number is unknown, or shards of different numbers are mixed.
+/// There are no results, so that the number of shards is unknown, or those of different numbers are mixed.
 pub fn missing(folders: &[PathBuf]) -> Result<String, CampaignError> {
     let mut of = None;
     let mut complete = BTreeSet::new();
-    for path in files(folders)? {
-        let header = Source::open(path.clone())?.header;
-        let Shard { part, of: number } = header.shard;
+    for (path, shard) in files(folders)? {
+        let Shard { part, of: number } = shard;
         if *of.get_or_insert(number) != number {
             let what = format!(
                 "this is a shard of {number}, others are of another number; name folders of one division only"
             );
             return Err(CampaignError::wrong(&path, what));
         }
-        complete.insert(part);
+        match read(&path, shard) {
+            Err(damaged @ CampaignError::Damaged { .. }) => say!("{damaged}"),
+            other => {
+                other?;
+                complete.insert(part);
+            }
+        }
     }
     let of = of.ok_or_else(|| nothing(folders))?;
     Ok(ranges((0..of).filter(|part| !complete.contains(part))))
+}
+
+/// Reads results to their end.
+fn read(path: &Path, shard: Shard) -> Result<(), CampaignError> {
+    let mut reader = Reader::open(path, shard)?;
+    while reader.advance()?.is_some() {}
+    Ok(())
 }
 
 /// Rising numbers as `1,3-5`.
@@ -224,10 +215,11 @@ pub fn tally(path: &Path, results: impl Read) -> Result<Tally, CampaignError> {
     })?;
     let mut tally = Tally::default();
     for line in lines {
-        tally.add(&shard::outcome(
-            path,
-            &line.map_err(CampaignError::read(path))?,
-        )?);
+        let line = line.map_err(CampaignError::read(path))?;
+        let outcome: Outcome = serde_json::from_str(&line).map_err(|error| {
+            CampaignError::wrong(path, format!("{error}: this is no result of a case"))
+        })?;
+        tally.add(&outcome);
     }
     if tally.cases() != merged.cases {
         let what = format!(

@@ -14,6 +14,7 @@ use sim::setup::RunConfig;
 use trace::LogHash;
 
 use super::CampaignError;
+use super::shard::Shard;
 
 /// The first line of a plan.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -79,21 +80,22 @@ pub(super) fn line(value: &impl Serialize) -> String {
 }
 
 /// The hash of a plan.
-struct Hash(Sha256);
+pub(super) struct Hash(Sha256);
 
 impl Hash {
-    fn new(scenes: &[Scene]) -> Self {
+    pub(super) fn new(scenes: &[Scene]) -> Self {
         let mut hash = Self(Sha256::new());
         hash.add(&line(&scenes));
         hash
     }
 
-    fn add(&mut self, line: &str) {
+    /// Adds the line of a case.
+    pub(super) fn add(&mut self, line: &str) {
         self.0.update(line);
         self.0.update("\n");
     }
 
-    fn finish(self) -> String {
+    pub(super) fn finish(self) -> String {
         LogHash(self.0.finalize().into()).to_string()
     }
 }
@@ -120,11 +122,16 @@ impl Plan {
             hash.add(&line.map_err(CampaignError::read(path))?);
             count += 1;
         }
-        if count != header.cases || hash.finish() != header.plan {
-            return Err(wrong(format!(
-                "the plan has {count} cases of {}, or they are not as they were written; write it again: plant-sim campaign plan",
-                header.cases
-            )));
+        let refuse = |what: &str| {
+            Err(wrong(format!(
+                "{what}; write it again: plant-sim campaign plan"
+            )))
+        };
+        if count != header.cases {
+            return refuse(&format!("the plan has {count} cases of {}", header.cases));
+        }
+        if hash.finish() != header.plan {
+            return refuse("the cases are here, but not as they were written");
         }
         let scenarios = header.situations.iter().map(|scene| {
             let scenario = Scenario::parse(&scene.scenario, &scene.name);
@@ -156,6 +163,19 @@ impl Plan {
             serde_json::from_str(&line)
                 .map_err(|error| CampaignError::wrong(&self.path, error.to_string()))
         }))
+    }
+
+    /// Those of them that belong to `shard`.
+    ///
+    /// # Errors
+    /// It can no longer be read.
+    pub fn cases_of(
+        &self,
+        shard: Shard,
+    ) -> Result<impl Iterator<Item = Result<Case, CampaignError>>, CampaignError> {
+        let is_of =
+            move |case: &Result<Case, _>| case.as_ref().map_or(true, |case| shard.has(case.case));
+        Ok(self.cases()?.filter(is_of))
     }
 
     /// The case of this number.

@@ -1,20 +1,22 @@
 //! A part of a plan, and the file of its results.
 //!
 //! The file is called `.partial` until it is complete. Results are appended a batch at a time: whatever ends the process leaves
-//! whole lines and at most a piece of one, which the next run cuts off.
+//! whole lines and at most a piece of one. The next run goes on after the last line up to which all are those of the plan.
 
+use std::fmt;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, BufRead as _, BufReader, Read, Seek as _, SeekFrom, Write as _};
+use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sim::campaign::tally::Outcome;
 
-use super::CampaignError;
-use super::plan::{self, Plan};
+use super::plan::{self, Plan, Scene};
+use super::results::Reader;
+use super::{CampaignError, undamaged};
 use crate::output::{OutputError, refuse_tilde};
+use crate::say;
 
 /// Part `part` of `of`, counted from 0: the cases whose number leaves this remainder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -43,6 +45,20 @@ impl Shard {
     pub fn file(self) -> String {
         format!("results-{}-of-{}.jsonl", self.part, self.of)
     }
+
+    /// Whose results a file of this name has.
+    pub fn of_file(name: &str) -> Option<Self> {
+        let numbers = name.strip_prefix("results-")?.strip_suffix(".jsonl")?;
+        let shard: Self = numbers.replace("-of-", "/").parse().ok()?;
+        (shard.file() == name).then_some(shard)
+    }
+}
+
+/// `K/N`.
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.part, self.of)
+    }
 }
 
 /// `K/N`.
@@ -67,6 +83,9 @@ pub struct ShardHeader {
     pub plan: String,
     /// Number of its cases.
     pub cases: u64,
+    /// Its situations, without which the hash cannot be worked out again.
+    #[serde(default)]
+    pub situations: Vec<Scene>,
     /// Build of the program: results of two builds are not those of one campaign.
     pub build: String,
     /// Which part of the plan is here.
@@ -80,9 +99,15 @@ impl ShardHeader {
         Self {
             plan: header.plan.clone(),
             cases: header.cases,
+            situations: header.situations.clone(),
             build: env!("COMMIT").into(),
             shard,
         }
+    }
+
+    /// Whether both are results of one plan.
+    pub fn is_of_plan_of(&self, other: &Self) -> bool {
+        self.plan == other.plan && self.cases == other.cases && self.situations == other.situations
     }
 }
 
@@ -94,33 +119,48 @@ pub struct Results {
     path: PathBuf,
 }
 
-/// What a shard finds in its folder.
-#[derive(Debug)]
-pub enum Beginning {
-    /// All of its results.
-    Complete,
-    /// Results up to this case, or none, and room for more.
-    After(Option<u64>, Results),
+/// Results that a shard finds in its folder.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Kept {
+    /// How many cases.
+    pub cases: u64,
+    /// How many of them missed a requirement.
+    pub missed: u64,
+    /// Length of their lines, and of the first.
+    length: u64,
+    /// Whether that is all of the shard, and nothing else.
+    is_whole: bool,
 }
 
 impl Results {
-    /// The file of results in `folder`, which is created if missing. With `resume` the results there are kept, otherwise they
-    /// are replaced.
+    /// The results in `folder`, which is created if missing, and the file for the rest, `None` if nothing is left. With `resume`
+    /// the results there are kept, otherwise they are replaced.
     ///
     /// # Errors
     /// Another process writes them, they belong to another plan, or the folder does not accept them.
     pub fn open(
         folder: &Path,
+        plan: &Plan,
         header: &ShardHeader,
         resume: bool,
-    ) -> Result<Beginning, CampaignError> {
+    ) -> Result<(Kept, Option<Self>), CampaignError> {
         refuse_tilde(folder)?;
         fs::create_dir_all(folder).map_err(CampaignError::write(folder))?;
         let path = folder.join(header.shard.file());
         let partial = partial_of(&path);
         if resume && path.exists() {
-            check(&path, header, &mut reader(&path)?)?;
-            return Ok(Beginning::Complete);
+            let file = File::open(&path).map_err(CampaignError::read(&path))?;
+            let kept = kept(&path, plan, header, file)?;
+            if kept.is_whole {
+                return Ok((kept, None));
+            }
+            let all = header.shard.share(header.cases);
+            let (shown, good) = (path.display(), kept.cases);
+            say!("{shown}: damaged after {good} of {all} cases; the rest is run again");
+            // A file that another run has begun since is the one to go on with.
+            if !partial.exists() {
+                fs::rename(&path, &partial).map_err(CampaignError::write(&partial))?;
+            }
         }
         let mut file = OpenOptions::new()
             .read(true)
@@ -135,15 +175,16 @@ impl Results {
             }
             .into());
         }
-        let (last, length) = if resume {
-            kept(&partial, header, &file)?
+        let kept = if resume {
+            let same = file.try_clone().map_err(CampaignError::read(&partial))?;
+            kept(&partial, plan, header, same)?
         } else {
-            (None, 0)
+            Kept::default()
         };
         let first = plan::line(header) + "\n";
-        file.set_len(length)
-            .and_then(|()| file.seek(SeekFrom::Start(length)))
-            .and_then(|_| match length {
+        file.set_len(kept.length)
+            .and_then(|()| file.seek(SeekFrom::Start(kept.length)))
+            .and_then(|_| match kept.length {
                 0 => file.write_all(first.as_bytes()),
                 _ => Ok(()),
             })
@@ -153,7 +194,7 @@ impl Results {
             partial,
             path,
         };
-        Ok(Beginning::After(last, results))
+        Ok((kept, Some(results)))
     }
 
     /// Appends whole lines.
@@ -184,85 +225,27 @@ fn partial_of(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// The last case in an incomplete file, and the length of its whole lines.
-fn kept(
-    path: &Path,
-    header: &ShardHeader,
-    file: &File,
-) -> Result<(Option<u64>, u64), CampaignError> {
-    let mut reader = BufReader::new(file);
-    let mut line = String::new();
-    let (mut last, mut length) = (None, 0);
-    loop {
-        line.clear();
-        // What was cut short in the middle of a character is no line either.
-        let read = match reader.read_line(&mut line) {
-            Err(error) if error.kind() == io::ErrorKind::InvalidData => 0,
-            other => other.map_err(CampaignError::read(path))?,
-        };
-        if !line.ends_with('\n') || read == 0 {
-            return Ok((last, length));
+/// How far a file that may be incomplete or damaged has the results of the plan.
+fn kept(path: &Path, plan: &Plan, header: &ShardHeader, file: File) -> Result<Kept, CampaignError> {
+    let mut kept = Kept::default();
+    let Some(mut reader) = undamaged(Reader::new(path, header.shard, file))? else {
+        return Ok(kept);
+    };
+    agree(path, header, reader.header())?;
+    kept.length = reader.length();
+    for case in plan.cases_of(header.shard)? {
+        let case = case?;
+        match undamaged(reader.advance())? {
+            Some(Some(outcome)) if outcome.case == case => {
+                kept.cases += 1;
+                kept.missed += u64::from(!outcome.verdict.missed.is_empty());
+                kept.length = reader.length();
+            }
+            _ => return Ok(kept),
         }
-        if length == 0 {
-            same(path, header, &line)?;
-        } else {
-            last = Some(outcome(path, &line)?.case.case);
-        }
-        length += read as u64;
     }
-}
-
-/// A line of results.
-///
-/// # Errors
-/// It is none.
-pub fn outcome(path: &Path, line: &str) -> Result<Outcome, CampaignError> {
-    serde_json::from_str(line).map_err(|error| {
-        CampaignError::wrong(path, format!("{error}: this is no result of a case"))
-    })
-}
-
-/// Reads the first line.
-///
-/// # Errors
-/// It cannot be read, or is not that of results.
-pub fn header(
-    path: &Path,
-    reader: &mut BufReader<impl Read>,
-) -> Result<ShardHeader, CampaignError> {
-    let mut line = String::new();
-    let read = reader.read_line(&mut line);
-    read.map_err(CampaignError::read(path))?;
-    parsed(path, &line)
-}
-
-/// Opens a file of results.
-///
-/// # Errors
-/// It cannot be read.
-pub fn reader(path: &Path) -> Result<BufReader<File>, CampaignError> {
-    File::open(path)
-        .map(BufReader::new)
-        .map_err(CampaignError::read(path))
-}
-
-fn check(
-    path: &Path,
-    expected: &ShardHeader,
-    reader: &mut BufReader<File>,
-) -> Result<(), CampaignError> {
-    let found = header(path, reader)?;
-    agree(path, expected, &found)
-}
-
-fn same(path: &Path, expected: &ShardHeader, line: &str) -> Result<(), CampaignError> {
-    agree(path, expected, &parsed(path, line)?)
-}
-
-fn parsed(path: &Path, line: &str) -> Result<ShardHeader, CampaignError> {
-    serde_json::from_str(line).map_err(|_| {
-        CampaignError::wrong(path, "the first line is not that of results of a campaign")
-    })
+    kept.is_whole = undamaged(reader.advance())? == Some(None);
+    Ok(kept)
 }
 
 fn agree(path: &Path, expected: &ShardHeader, found: &ShardHeader) -> Result<(), CampaignError> {
@@ -304,6 +287,17 @@ mod tests {
         assert_eq!("0/1".parse(), Ok(Shard::WHOLE));
         for wrong in ["1/1", "1", "a/2", "-1/2", "0/0", ""] {
             assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_file_is_called_after_its_shard() {
+        let shard = Shard { part: 2, of: 11 };
+        assert_eq!(shard.file(), "results-2-of-11.jsonl");
+        assert_eq!(Shard::of_file(&shard.file()), Some(shard));
+        for wrong in ["2-of-11", "02-of-11", "11-of-11", "2/11", "copy"] {
+            let name = format!("results-{wrong}.jsonl");
+            assert_eq!(Shard::of_file(&name), None, "{name}");
         }
     }
 }

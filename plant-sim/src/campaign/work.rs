@@ -11,7 +11,7 @@ use sim::controller::InProcess;
 
 use super::CampaignError;
 use super::plan::{self, Plan};
-use super::shard::{Beginning, Results, Shard, ShardHeader};
+use super::shard::{Results, Shard, ShardHeader};
 use crate::parallel;
 use crate::progress::Progress;
 
@@ -21,9 +21,11 @@ const BATCH: usize = 50;
 /// What a shard has come to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Done {
-    /// Cases run now; those that were there are not among them.
-    pub cases: u64,
-    /// How many of them missed a requirement.
+    /// Cases run now.
+    pub run: u64,
+    /// Cases of which the results were there.
+    pub kept: u64,
+    /// How many of both missed a requirement.
     pub missed: u64,
 }
 
@@ -38,17 +40,18 @@ pub fn work(
     resume: bool,
     folder: &Path,
 ) -> Result<Done, CampaignError> {
-    let mut done = Done::default();
     let header = ShardHeader::new(plan, shard);
-    let Beginning::After(last, mut results) = Results::open(folder, &header, resume)? else {
+    let (kept, results) = Results::open(folder, plan, &header, resume)?;
+    let mut done = Done {
+        run: 0,
+        kept: kept.cases,
+        missed: kept.missed,
+    };
+    let Some(mut results) = results else {
         return Ok(done);
     };
-    let left = |case: &u64| shard.has(*case) && last.is_none_or(|last| *case > last);
-    let before = last.map_or(0, |last| shard.share(last + 1));
-    let mut progress = Progress::of_cases(shard.share(header.cases) - before);
-    let mut cases = plan
-        .cases()?
-        .filter(|case| case.as_ref().map_or(true, |case| left(&case.case)));
+    let mut progress = Progress::of_cases(shard.share(header.cases) - kept.cases);
+    let mut cases = plan.cases_of(shard)?.skip(kept.cases as usize);
     loop {
         let batch = cases.by_ref().take(BATCH * jobs.get());
         let batch: Vec<Case> = batch.collect::<Result<_, _>>()?;
@@ -60,7 +63,7 @@ pub fn work(
         for (case, verdict) in batch.into_iter().zip(verdicts) {
             let verdict = verdict?;
             let outcome = Outcome { case, verdict };
-            done.cases += 1;
+            done.run += 1;
             done.missed += u64::from(!outcome.verdict.missed.is_empty());
             lines += &plan::line(&outcome);
             lines.push('\n');

@@ -34,7 +34,7 @@ pub(super) enum CampaignCommand {
     Merge(FoldersArgs),
     /// Show the worst cases by fault and situation, and how many held what is promised.
     Report(ReportArgs),
-    /// List the parts without results, as a job array takes them: 1,3-5.
+    /// List the parts without complete and valid results, as a job array takes them: 1,3-5.
     Missing(FoldersArgs),
     /// Run one case with trace, truth, summary and page.
     Replay(ReplayArgs),
@@ -68,7 +68,7 @@ pub(super) struct RunArgs {
     /// Threads; as many as the machine has cores if left out.
     #[arg(long, value_name = "N", value_parser = count)]
     jobs: Option<NonZero<u32>>,
-    /// Keep the results that are there, and go on after them.
+    /// Keep the results that are there, as far as they are good, and go on after them.
     #[arg(long)]
     resume: bool,
     /// Where the results go: results-K-of-N.jsonl.
@@ -169,15 +169,17 @@ fn work(args: &RunArgs) -> Result<(), Failure> {
     let done = work::work(&plan, shard, jobs, args.resume, &args.out)?;
     let out = args.out.display();
     show(&format!(
-        "{} cases run, {} missed a requirement; the results are in {}: plant-sim campaign merge {out} | plant-sim campaign report -\n",
-        done.cases,
+        "{} cases run, {} kept, {} missed a requirement; the results are in {}: plant-sim campaign merge {out} | plant-sim campaign report -\n",
+        done.run,
+        done.kept,
         done.missed,
         args.out.join(shard.file()).display()
     ))?;
     if done.missed > 0 {
         return Err(Failure::failed(format!(
             "{} of {} cases missed a requirement",
-            done.missed, done.cases
+            done.missed,
+            done.run + done.kept
         )));
     }
     Ok(())

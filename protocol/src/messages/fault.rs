@@ -112,20 +112,32 @@ impl Unit {
         }
     }
 
-    fn show(self, value: f32, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// Digits after the point of a number in this unit.
+    const fn digits(self) -> usize {
+        match self {
+            Self::RadianOrMetre | Self::SpeedOfAxis => 4,
+            Self::Radian => 3,
+            Self::RadianPerSecond | Self::MetrePerSecond => 2,
+            Self::Metre | Self::Millisecond | Self::NewtonMetre | Self::Newton | Self::Effort => 1,
+            _ => 0,
+        }
+    }
+
+    /// The number as it is shown.
+    fn scaled(self, value: f32) -> f32 {
+        match self {
+            Self::Metre => value * 1e3,
+            _ => value,
+        }
+    }
+
+    fn show(self, value: f32, digits: usize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::None => Ok(()),
-            Self::Metre => write!(f, "{:.1} mm", value * 1e3),
-            Self::Radian => write!(f, "{value:.3} rad"),
-            Self::RadianPerSecond | Self::MetrePerSecond => {
-                write!(f, "{value:.2} {}", self.symbol())
+            Self::Metre => write!(f, "{value:.digits$} mm"),
+            Self::Frame | Self::Sample => {
+                write!(f, "{value:.digits$} {} in a row", self.symbol())
             }
-            Self::RadianOrMetre | Self::SpeedOfAxis => write!(f, "{value:.4} {}", self.symbol()),
-            Self::Millisecond | Self::NewtonMetre | Self::Newton | Self::Effort => {
-                write!(f, "{value:.1} {}", self.symbol())
-            }
-            Self::Percent => write!(f, "{value:.0} %"),
-            Self::Frame | Self::Sample => write!(f, "{value:.0} {} in a row", self.symbol()),
             Self::DriveStatus => {
                 f.write_str("drive status")?;
                 let mut bits = value as u8;
@@ -142,8 +154,19 @@ impl Unit {
                 Err(unknown) => write!(f, "{unknown}"),
             },
             Self::Identifier => write!(f, "identifier {:#05x}", value as u16),
+            _ => write!(f, "{value:.digits$} {}", self.symbol()),
         }
     }
+}
+
+/// `digits` after the point, or as many more, up to three, as it takes to tell the two numbers apart.
+fn telling_apart(a: f32, b: f32, digits: usize) -> usize {
+    let differ = |digits: &usize| {
+        let scale = (0..*digits).fold(1.0, |scale, _| scale * 10.0);
+        let rounded = |number: f32| (f64::from(number.abs()) * scale + 0.5) as u64;
+        rounded(a) != rounded(b)
+    };
+    (digits..=digits + 3).find(differ).unwrap_or(digits)
 }
 
 impl Fault {
@@ -219,10 +242,15 @@ impl fmt::Display for Fault {
         let unit = self.unit();
         if unit != Unit::None && self.value != 0.0 {
             f.write_str(": ")?;
-            unit.show(self.value, f)?;
-            if self.limit != 0.0 {
+            let (value, limit) = (unit.scaled(self.value), unit.scaled(self.limit));
+            let mut digits = unit.digits();
+            if limit != 0.0 {
+                digits = telling_apart(value, limit, digits);
+            }
+            unit.show(value, digits, f)?;
+            if limit != 0.0 {
                 f.write_str(", limit ")?;
-                unit.show(self.limit, f)?;
+                unit.show(limit, digits, f)?;
             }
         }
         Ok(())

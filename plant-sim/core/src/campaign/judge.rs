@@ -138,7 +138,7 @@ impl Judge {
 
     /// The scenario has ended, completed or not, and the arm has come to rest. What follows is to be still.
     pub fn ended(&mut self, completed: bool) {
-        self.survived = completed && !self.is_detected();
+        self.survived = completed && self.first().is_none();
         self.rest = self.last;
         // Without feedback it may still be waiting for the brake.
         let is_latched = matches!(self.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop);
@@ -146,7 +146,8 @@ impl Judge {
             self.miss(Requirement::Latch);
         }
         let reported = self.report.map(|report| report.1);
-        if !self.expected.allows(self.survived, reported) {
+        let is_early = self.first().is_some_and(|at| at < self.onset.seconds());
+        if is_early || !self.expected.allows(self.survived, reported) {
             self.miss(Requirement::NoFalseAlarm);
         }
     }
@@ -178,8 +179,7 @@ impl Judge {
             self.miss(Requirement::Standstill);
         }
         let stopped = self.detected.is_some();
-        let reported = self.report.map(|(time, _)| time.seconds());
-        let at = [reported, self.cut].into_iter().flatten().reduce(f64::min);
+        let at = self.first().filter(|at| *at >= onset);
         Verdict {
             survived: self.survived,
             detected: match self.report {
@@ -199,8 +199,10 @@ impl Judge {
         self.missed.insert(requirement);
     }
 
-    fn is_detected(&self) -> bool {
-        self.report.is_some() || self.cut.is_some()
+    /// When something was detected, s.
+    fn first(&self) -> Option<f64> {
+        let reported = self.report.map(|(time, _)| time.seconds());
+        [reported, self.cut].into_iter().flatten().reduce(f64::min)
     }
 
     /// The controller has commanded the drives.
@@ -267,18 +269,15 @@ impl Judge {
             lift: plant.q[2],
             energy: energy + elastic,
         };
-        if self.is_detected() {
-            self.detected.get_or_insert(mark);
+        if self.first().is_some() {
+            let detected = *self.detected.get_or_insert(mark);
             self.lift.follow(plant, reference, is_driven);
-            self.judge_stop(mark, is_driven, elastic > 0.0);
+            self.judge_stop(detected, mark, is_driven, elastic > 0.0);
         }
     }
 
     /// The way of the arm to standstill, once its fault has been detected.
-    fn judge_stop(&mut self, now: Mark, is_driven: bool, on_stop: bool) {
-        let Some(detected) = self.detected else {
-            return;
-        };
+    fn judge_stop(&mut self, detected: Mark, now: Mark, is_driven: bool, on_stop: bool) {
         if is_driven {
             let was_off = self.off.take().is_some();
             if self.report.is_none() {
@@ -360,7 +359,7 @@ impl Observer for Judge {
         {
             self.cut.get_or_insert(plant.t);
         }
-        if is_powered && !self.is_detected() && truth.mind.knows_where() {
+        if is_powered && self.first().is_none() && truth.mind.knows_where() {
             self.watch_limits(truth);
         }
         let now = Instant::ORIGIN + Duration::from_seconds(plant.t);
@@ -368,7 +367,7 @@ impl Observer for Judge {
             && self.rest.is_none()
             && now >= due
             && is_powered
-            && !self.is_detected()
+            && self.first().is_none()
         {
             self.miss(Requirement::Detected);
         }

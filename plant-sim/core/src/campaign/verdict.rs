@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Requirement {
-    /// No stop where nothing is wrong, and none for what a sound system survives.
+    /// No stop where nothing is wrong, or not yet, and none for what a sound system survives.
     NoFalseAlarm,
     /// Faults with a limit of time are detected within it.
     Detected,
@@ -63,7 +63,7 @@ pub struct Verdict {
     pub survived: bool,
     /// What stopped it: a cause that the controller reported, or `drives` where they switched off by themselves.
     pub detected: Option<String>,
-    /// From the beginning of the fault until it was detected, ms.
+    /// From the beginning of the fault until it was detected, ms; of a false alarm before it there is none.
     pub detection_ms: Option<f64>,
     /// From the beginning of the fault until the arm stood still, ms.
     pub standstill_ms: Option<f64>,
