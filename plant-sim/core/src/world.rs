@@ -157,10 +157,10 @@ pub enum OperatorError {
         /// Longest wait.
         limit: Duration,
     },
-    /// The controller sends nothing any more.
-    #[error("the controller has been silent since {:.3} s", since.seconds())]
+    /// The controller tells nothing new any more.
+    #[error("the controller has been silent since {:.3} s, when its last new state came", since.seconds())]
     Silent {
-        /// Time of its last frame.
+        /// Time of its last new state.
         since: Instant,
     },
     /// The controller has started anew, and knows nothing of the move that it was asked for.
