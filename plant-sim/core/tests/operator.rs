@@ -78,3 +78,17 @@ fn a_controller_that_starts_anew_is_told_from_a_silent_one() {
         assert!(summary.sim_time_s < 2.0, "{dead}: {}", summary.sim_time_s);
     }
 }
+
+/// Whatever the operator waits for then: an answer, the end of a move, of a dwell.
+#[test]
+fn a_controller_that_reboots_in_a_cycle_has_started_anew() {
+    for at in (250..900).step_by(13) {
+        let fault = format!("controller:dead@{at}ms..+20ms");
+        let (summary, _) = run(&[&fault]);
+        assert_eq!(
+            summary.error.as_deref(),
+            Some("the controller has started anew: it went to pre-operational without a stop"),
+            "{fault}"
+        );
+    }
+}

@@ -2,13 +2,12 @@
 
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{Cause, Heartbeat, Message, Mode, Node, ParameterReply, Server};
+use protocol::messages::{Cause, Heartbeat, Message, Mode, Node, ParameterReply, Server, State};
 use protocol::schema::Content;
 use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use super::Operator;
-use super::program::{Action, Task};
 use crate::world::OperatorError;
 
 /// Time without a new state after which the controller counts as silent: fifty states.
@@ -37,9 +36,11 @@ impl Operator {
                     self.state = Some(state);
                 }
             }
-            // A controller that starts anew begins its counters anew, and says at once that it is not operational.
-            Message::Heartbeat(_, Heartbeat { state, .. }) if is_starting(state) => {
+            // A controller that starts anew begins its counters anew, and says at once that it is not operational. Its first state has
+            // been taken for an old one.
+            Message::Heartbeat(_, Heartbeat { state: mode, .. }) if is_starting(mode) => {
                 self.states.reset();
+                self.state = self.state.map(|state| State { mode, ..state });
             }
             // An answer is known by the number of its request.
             Message::MotionReply(reply) if reply.sequence == self.awaited => {
@@ -63,11 +64,8 @@ impl Operator {
                 fault: state.fault(),
             });
         }
-        // A controller that has just started has no move to end.
-        if let Some(Task {
-            action: Action::WaitArrived,
-            ..
-        }) = self.current
+        // In a cycle the axes are under torque, and a controller that has just started knows nothing of that.
+        if self.current.is_some_and(|task| task.spot.is_some())
             && let Some(state) = self.state
             && (is_starting(state.mode) || state.mode == Mode::Ready)
         {
