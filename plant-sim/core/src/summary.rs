@@ -68,9 +68,10 @@ pub struct Summary {
     /// From the end of the commanded motion until the tool is within 0.01 mm and 0.1 mrad and stays, s; `null` as
     /// above.
     pub settle_time_s: Option<MeanMax>,
-    /// True tool to commanded tool at the same instant, while the reference moves, mm.
+    /// True tool to commanded tool at the same instant, while the reference moves, mm; without the samples that the controller has
+    /// not answered by the next one, of which there is no reference.
     pub tracking_error_mm: RmsMax,
-    /// True yaw to commanded yaw at the same instant, while the reference moves, mrad.
+    /// True yaw to commanded yaw at the same instant, while the reference moves, mrad; without the same samples.
     pub tracking_error_mrad: RmsMax,
     /// Distance from the target at the end of a dwell, mm.
     pub final_error_mm: FinalError,
