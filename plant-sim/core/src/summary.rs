@@ -77,7 +77,8 @@ pub struct Summary {
     pub final_error_mm: FinalError,
     /// Yaw error from the target at the end of a dwell, mrad.
     pub final_error_mrad: FinalError,
-    /// Peak effort over its limit, by axis, of 1.
+    /// Peak effort over its limit, by axis, of 1. Each motor keeps to its own; the wrist bears the torque of the lift's nut as
+    /// well, and may have more.
     pub torque_utilisation: [f64; 4],
     /// Root-mean-square effort over the continuous limit, by axis, of 1.
     pub thermal_utilisation: [f64; 4],
