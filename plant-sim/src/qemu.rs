@@ -34,7 +34,6 @@ use crate::twin::Twin;
 use board::Board;
 use sim::controller::COMPUTE;
 use sim::peer::{Outbox, Peer, PeerError};
-use sim::world::Mind;
 use sim::world::World;
 use trace::difference::Difference;
 
@@ -321,7 +320,7 @@ impl Peer for Qemu {
                 self.catch_up(self.most_ahead / 2)?;
             }
         }
-        world.mind = Mind::of(self.twin.node());
+        world.mind = self.twin.controller().mind();
         Ok(())
     }
 

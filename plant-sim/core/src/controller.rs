@@ -4,8 +4,9 @@ use firmware::cabinet::rejoin::Rejoin;
 use firmware::cabinet::sample_clock::SampleClock;
 use firmware::control::controller::Config;
 use firmware::node::Node;
+use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::ResetReason;
+use protocol::messages::{Message, ResetReason};
 use protocol::table;
 use protocol::time::{Duration, Instant};
 
@@ -33,6 +34,8 @@ pub struct InProcess {
     last: Option<Instant>,
     /// Frames sent in the current call; empty between calls.
     sent: Vec<CanFrame>,
+    /// Number of the sample that the last command answers.
+    answered: Option<u32>,
 }
 
 impl InProcess {
@@ -49,6 +52,7 @@ impl InProcess {
             rejoin: Rejoin::default(),
             last: None,
             sent: Vec::new(),
+            answered: None,
         }
     }
 
@@ -60,6 +64,11 @@ impl InProcess {
     /// The node.
     pub fn node(&self) -> &Node {
         &self.node
+    }
+
+    /// Its intention.
+    pub fn mind(&self) -> Mind {
+        Mind::of(&self.node, self.answered)
     }
 
     /// Present time of the node.
@@ -90,7 +99,13 @@ impl InProcess {
     /// replaced by a new one.
     pub fn call(&mut self, now: Instant, received: Option<&CanFrame>, sent: &mut Vec<CanFrame>) {
         // Never full: the caller takes everything at once.
+        let answered = &mut self.answered;
         let mut send = |frame: &CanFrame| {
+            if table::COMMAND.identifies(frame)
+                && let Ok(Message::Command(command)) = codec::decode(frame).map(|it| it.message)
+            {
+                *answered = Some(command.sample);
+            }
             sent.push(*frame);
             Ok(())
         };
@@ -131,7 +146,7 @@ impl Peer for InProcess {
         self.call(now, received, &mut sent);
         out.extend(sent.drain(..).map(|frame| (now + COMPUTE, frame)));
         self.sent = sent;
-        world.mind = Mind::of(&self.node);
+        world.mind = self.mind();
         Ok(())
     }
 

@@ -268,16 +268,22 @@ impl Peer for Drives {
         world: &mut World,
         out: &mut Outbox,
     ) -> Result<(), PeerError> {
-        let plant = &mut world.plant;
+        let World {
+            plant,
+            clock,
+            sample,
+            ..
+        } = world;
         match received {
             None => {
                 let period = self.period.duration();
                 self.beat(now, plant, out);
-                self.next = now + BrokenClock::tick(&world.clock, period);
-                if BrokenClock::misses(&mut world.clock) {
+                self.next = now + BrokenClock::tick(clock, period);
+                if BrokenClock::misses(clock) {
                     self.watchdog(now, plant);
                 } else {
                     plant.advance_to(now.nanos());
+                    *sample = Some(self.sample);
                     out.push((now, self.feedback(plant)));
                 }
             }

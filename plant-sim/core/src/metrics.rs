@@ -5,7 +5,8 @@
 //! - *Settling time*: from the end of the commanded motion until the tool is within 0.01 mm and 0.1 mrad and stays there,
 //!   the usual definition for a motion axis. An angle counts as the distance that it moves a point 100 mm from the
 //!   tool's axis.
-//! - *Tracking error*: true tool to commanded tool at the same instant, while the reference moves; position and yaw.
+//! - *Tracking error*: true tool to commanded tool at the same instant, while the reference moves; position and yaw. Of a
+//!   sample that the controller has not answered by the next one there is no reference, and no error.
 //! - *Utilisation*: largest torque or speed over its limit; thermal: root mean square over what
 //!   the continuous rating of the motor.
 //! - *Saturation*: longest time with a motor at its limit, by axis, according to the plant.
@@ -145,11 +146,11 @@ impl Metrics {
         let _ = self.tracked(truth);
     }
 
-    /// One sample; returns the offset of the tool from its reference, while that moves.
+    /// One sample; returns the offset of the tool from its reference, where there is one that moves.
     pub(crate) fn tracked(&mut self, truth: &Truth) -> Option<Offset> {
         let cycle = self.cycle.as_mut()?;
         let mut tracking = None;
-        if cycle.sample(truth) {
+        if cycle.sample(truth) && truth.is_answered() {
             let commanded = self.arm.pose(&self.arm.at(&truth.mind.q.into()));
             let commanded = [commanded.x, commanded.y, commanded.z, commanded.yaw];
             let error = Offset::between(&truth.plant.tool, &commanded);

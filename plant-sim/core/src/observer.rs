@@ -21,6 +21,13 @@ pub struct Truth {
     pub mind: Mind,
 }
 
+impl Truth {
+    /// Whether the intention is the answer to this sample. Where the drives took none, or the answer is late, it is an earlier one.
+    pub fn is_answered(&self) -> bool {
+        self.mind.sample.is_some()
+    }
+}
+
 /// The robot at the instant of a sample. Joints in order: shoulder, elbow, lift, wrist (rad, m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantState {

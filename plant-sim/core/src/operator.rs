@@ -3,14 +3,16 @@
 //! It knows the controller by its messages alone. Every wait has a limit, and its error names what is late.
 
 mod desk;
+mod news;
 pub(crate) mod program;
 mod signs;
 
-use protocol::codec::{self, Encoder};
+use protocol::codec::Encoder;
+use protocol::e2e::{Profile, Receiver};
 use protocol::frame::CanFrame;
 use protocol::messages::{
-    Cause, EStop, EStopReason, Hello, Message, Mode, MotionRequest, Node, Outcome, ParameterReply,
-    ParameterRequest, Server, State,
+    EStop, EStopReason, Hello, Message, Mode, MotionRequest, Outcome, ParameterRequest, Server,
+    State,
 };
 use protocol::table;
 use protocol::time::{Duration, Instant, Period};
@@ -32,8 +34,6 @@ const MODE_LIMIT: Duration = Duration::from_secs(2);
 const MOVE_LIMIT_S: f64 = 120.0;
 /// Longest wait for a move of any speed, s.
 const ANY_MOVE_LIMIT_S: f64 = 1e9;
-/// Time without any frame after which the controller counts as silent: ten heartbeats.
-const SILENCE_LIMIT: Duration = Duration::from_secs(1);
 /// Its first heartbeat comes between those of the drives.
 const FIRST_HEARTBEAT: Instant = Instant::from_nanos(50_000_000);
 
@@ -68,9 +68,11 @@ pub struct Operator {
     reply: Option<Outcome>,
     greeted: Option<Hello>,
     state: Option<State>,
+    /// Tells a new state from an old one.
+    states: Receiver,
     /// Whether the controller has reported a fault that is not cleared.
     alarmed: bool,
-    /// Time of the controller's last frame.
+    /// Time of the last new state.
     heard: Instant,
     /// Sequence number of the last accepted move.
     last_move: Option<u8>,
@@ -101,38 +103,13 @@ impl Operator {
             reply: None,
             greeted: None,
             state: None,
+            states: Receiver::new(Profile::Fd),
             alarmed: false,
             heard: Instant::ORIGIN,
             last_move: None,
             slowest: 1.0,
             pace: 1.0,
             held: false,
-        }
-    }
-
-    /// Takes a frame that has just arrived.
-    fn receive(&mut self, now: Instant, frame: &CanFrame) {
-        if table::of_frame(frame).is_none_or(|info| info.sender != Some(Node::Controller)) {
-            return;
-        }
-        self.heard = now;
-        // Commands do not concern an operator.
-        if table::COMMAND.identifies(frame) {
-            return;
-        }
-        let Ok(received) = codec::decode(frame) else {
-            return;
-        };
-        match received.message {
-            Message::MotionReply(reply) if reply.sequence == self.awaited => {
-                self.reply = Some(reply.outcome);
-            }
-            Message::ParameterReply(Server::Controller, ParameterReply::Hello(hello)) => {
-                self.greeted = Some(hello);
-            }
-            Message::State(state) => self.state = Some(state),
-            Message::Emergency(_, emergency) => self.alarmed = emergency.cause != Cause::None,
-            _ => {}
         }
     }
 
@@ -203,35 +180,6 @@ impl Operator {
                 return Ok(false);
             }
         }
-    }
-
-    /// Ends the run if the controller has stopped by itself or gone silent.
-    fn watch(&self, now: Instant) -> Result<(), OperatorError> {
-        if let Some(state) = self.state
-            && matches!(state.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop)
-        {
-            return Err(OperatorError::Stopped {
-                mode: state.mode,
-                fault: state.fault(),
-            });
-        }
-        // A controller that has just started has no move to end.
-        if let Some(Task {
-            action: Action::WaitArrived,
-            ..
-        }) = self.current
-            && let Some(state) = self.state
-            && matches!(
-                state.mode,
-                Mode::Boot | Mode::SelfTest | Mode::PreOperational | Mode::Ready
-            )
-        {
-            return Err(OperatorError::Restarted { mode: state.mode });
-        }
-        if now.since(self.heard) > SILENCE_LIMIT {
-            return Err(OperatorError::Silent { since: self.heard });
-        }
-        Ok(())
     }
 
     fn begin(&mut self, action: &Action) -> Option<CanFrame> {

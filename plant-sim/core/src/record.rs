@@ -99,7 +99,7 @@ pub const TRUTH_COLUMNS: [(&str, &str, &str); 25] = [
     (
         "tau4",
         "N m",
-        "Effort that the motor brings to the joint, after all limits, wrist.",
+        "Effort that the motors bring to the joint, after all limits, wrist: with the torque of the lift's nut.",
     ),
     ("x", "m", "True flange, x in frame 0."),
     ("y", "m", "True flange, y in frame 0."),

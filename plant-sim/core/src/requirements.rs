@@ -39,7 +39,7 @@ pub struct Verdict {
 /// What is known of a sample besides its truth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
-    /// Offset of the tool from its reference, while that moves.
+    /// Offset of the tool from its reference, where there is one that moves.
     pub(crate) tracking: Option<Offset>,
     /// Samples for which each motor has been at its limit.
     pub(crate) saturated: [u64; 4],
@@ -152,6 +152,7 @@ impl Judge {
                 }
                 // The others are of cycles, as in the summary.
                 _ if !in_cycle => None,
+                Quantity::FollowingMrad | Quantity::FollowingMm if !truth.is_answered() => None,
                 Quantity::FollowingMrad => {
                     let errors = std::array::from_fn(following);
                     Some(watch.of_axes(&errors, &TURNING))

@@ -117,6 +117,7 @@ impl<'p> Rig<'p> {
             world: World {
                 plant: Plant::new(&config.actual, config.start),
                 mind: Mind::BLANK,
+                sample: None,
                 clock: None,
                 cell_events: Vec::new(),
                 outcome: None,
@@ -246,6 +247,7 @@ impl<'p> Rig<'p> {
         self.world.plant.advance_to(now.nanos());
         let plant = PlantState::of(&self.world.plant, now);
         self.watch(now, observer);
+        self.world.sample = None;
         self.sample += 1;
         while let Some(event) = self.next_event(self.now()) {
             match event {
@@ -259,7 +261,10 @@ impl<'p> Rig<'p> {
                 Event::Wake(seat, time) => self.call(seat, time, None, observer)?,
             }
         }
-        let mind = self.world.mind;
+        let World {
+            mut mind, sample, ..
+        } = self.world;
+        mind.sample = mind.sample.filter(|answered| sample == Some(*answered));
         observer.sample(&Truth { plant, mind })?;
         Ok(())
     }

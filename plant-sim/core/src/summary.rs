@@ -1,5 +1,6 @@
 //! Summary of a run, gathered while it runs.
 
+mod faults;
 mod injected;
 mod recipe;
 mod warmth;
@@ -8,7 +9,7 @@ use std::io;
 
 use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::{Cause, FaultAxis, Message, Mode, Node, State};
+use protocol::messages::{Cause, Message, Mode, Node, State};
 use protocol::schema::Content;
 use protocol::table;
 use protocol::time::{Duration, Instant};
@@ -17,6 +18,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use trace::ErrorFrame;
 
+pub use faults::Fault;
+use faults::Faults;
 pub use injected::Injected;
 use injected::Windows;
 pub use recipe::{GainsInForce, Model, Models, Recipe};
@@ -65,15 +68,17 @@ pub struct Summary {
     /// From the end of the commanded motion until the tool is within 0.01 mm and 0.1 mrad and stays, s; `null` as
     /// above.
     pub settle_time_s: Option<MeanMax>,
-    /// True tool to commanded tool at the same instant, while the reference moves, mm.
+    /// True tool to commanded tool at the same instant, while the reference moves, mm; without the samples that the controller has
+    /// not answered by the next one, of which there is no reference.
     pub tracking_error_mm: RmsMax,
-    /// True yaw to commanded yaw at the same instant, while the reference moves, mrad.
+    /// True yaw to commanded yaw at the same instant, while the reference moves, mrad; without the same samples.
     pub tracking_error_mrad: RmsMax,
     /// Distance from the target at the end of a dwell, mm.
     pub final_error_mm: FinalError,
     /// Yaw error from the target at the end of a dwell, mrad.
     pub final_error_mrad: FinalError,
-    /// Peak effort over its limit, by axis, of 1.
+    /// Peak effort over its limit, by axis, of 1. Each motor keeps to its own; the wrist bears the torque of the lift's nut as
+    /// well, and may have more.
     pub torque_utilisation: [f64; 4],
     /// Root-mean-square effort over the continuous limit, by axis, of 1.
     pub thermal_utilisation: [f64; 4],
@@ -98,7 +103,7 @@ pub struct Summary {
     pub frames_lost: u64,
     /// Faults of the scenario, and when each was in effect.
     pub injected: Vec<Injected>,
-    /// Faults that the controller reported; one that follows itself is listed once.
+    /// Faults that the controller reported, by an emergency or by its state; one that follows itself is listed once.
     pub faults: Vec<Fault>,
     /// Simulated time, s.
     pub sim_time_s: f64,
@@ -113,53 +118,17 @@ pub struct FinalError {
     pub max: Option<f64>,
 }
 
-/// A fault that the controller reported.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Fault {
-    /// When, s.
-    pub time_s: f64,
-    /// Cause.
-    pub cause: &'static str,
-    /// Emergency error code (CiA 301, CiA 402), hexadecimal.
-    pub code: String,
-    /// What it means.
-    pub description: &'static str,
-    /// Axis, if one is concerned and known: an emergency does not say it, and the state that follows names that of the first fault
-    /// alone, as long as it is latched.
-    pub axis: Option<&'static str>,
-    /// Value found; 0 if the fault has no number.
-    pub value: f32,
-    /// Limit; 0 if the fault has none.
-    pub limit: f32,
-    /// Unit of value and limit.
-    pub unit: &'static str,
-    /// All of it as text.
-    pub text: String,
-}
-
-impl Fault {
-    fn describe(&mut self, fault: &protocol::messages::Fault) {
-        self.axis = (fault.axis != FaultAxis::None).then_some(fault.axis.name());
-        self.value = fault.value;
-        self.limit = fault.limit;
-        self.unit = fault.unit().symbol();
-        self.text = fault.to_string();
-    }
-}
-
 /// The observer that makes a [`Summary`].
 pub struct Collector {
     metrics: Metrics,
     judge: Judge,
     windows: Windows,
     thermometer: Thermometer,
-    faults: Vec<Fault>,
+    faults: Faults,
     /// The last state.
     state: Option<State>,
     /// Least pace of a move, of 1.
     pace: f64,
-    /// Whether an emergency has arrived and no state since.
-    awaits_state: bool,
     target: Option<[f64; 4]>,
     timing: BitTiming,
     /// Whether a command has arrived since the last sample; `None` before the very first.
@@ -175,10 +144,9 @@ impl Collector {
             judge: Judge::new(config),
             windows: Windows::new(&config.scenario),
             thermometer: Thermometer::new(&config.actual),
-            faults: Vec::new(),
+            faults: Faults::default(),
             state: None,
             pace: 1.0,
-            awaits_state: false,
             target: config.cycle_target(),
             timing: BitTiming::default(),
             answered: None,
@@ -257,7 +225,7 @@ impl Collector {
             overruns,
             frames_lost,
             injected: windows.finish(scenario, sim),
-            faults,
+            faults: faults.finish(),
             sim_time_s: sim.seconds(),
             each_cycle: metrics.cycles,
         }
@@ -282,42 +250,19 @@ impl Observer for Collector {
             return Ok(());
         };
         match received.message {
-            // While the arm stops, the controller says the same again; the trace has every one.
-            Message::Emergency(_, emergency)
-                if self
-                    .faults
-                    .last()
-                    .is_some_and(|last| last.cause == emergency.cause.name()) => {}
             Message::Emergency(_, emergency) => {
-                let mut fault = Fault {
-                    time_s: time.seconds(),
-                    cause: emergency.cause.name(),
-                    code: format!("{:04x}", emergency.code),
-                    description: emergency.cause.describe(),
-                    axis: None,
-                    value: 0.0,
-                    limit: 0.0,
-                    unit: "",
-                    text: String::new(),
-                };
-                fault.describe(&emergency.fault());
-                self.judge.fault(time);
-                self.faults.push(fault);
-                self.awaits_state = true;
+                if self.faults.emergency(time, &emergency) {
+                    self.judge.fault(time);
+                }
             }
-            // The state with the rest of the fault follows at once, unless an earlier state is still on the bus.
             Message::State(state) => {
                 self.state = Some(state);
                 self.thermometer.state(time, &state);
                 if state.mode == Mode::Moving {
                     self.pace = self.pace.min(f64::from(state.pace) / 100.0);
                 }
-                if self.awaits_state
-                    && let Some(last) = self.faults.last_mut()
-                    && last.cause == state.cause.name()
-                {
-                    self.awaits_state = false;
-                    last.describe(&state.fault());
+                if self.faults.state(time, &state) {
+                    self.judge.fault(time);
                 }
             }
             _ => {}

@@ -18,6 +18,8 @@ pub struct World {
     pub plant: Plant,
     /// The controller's intention.
     pub mind: Mind,
+    /// Number of the sample that the drives have taken in the present one of the rig; `None` if they have not.
+    pub sample: Option<u32>,
     /// The clock by which the drives take their samples; `None` while it is sound.
     pub clock: Option<BrokenClock>,
     /// Events in the cell during this call.
@@ -37,6 +39,8 @@ pub struct Mind {
     pub mode: Mode,
     /// Sequence number of the move under way.
     pub under_way: Option<u8>,
+    /// Number of the sample that it answers; `None` before the first one, and in a [`Truth`](crate::observer::Truth) of another sample.
+    pub sample: Option<u32>,
 }
 
 impl Mind {
@@ -46,6 +50,7 @@ impl Mind {
         qd: [0.0; 4],
         mode: Mode::Boot,
         under_way: None,
+        sample: None,
     };
 
     /// Whether there is a reference: a controller that has just started has none.
@@ -56,8 +61,8 @@ impl Mind {
         )
     }
 
-    /// The intention of this node.
-    pub fn of(node: &Node) -> Self {
+    /// The intention of this node, which has last answered the sample of this number.
+    pub(crate) fn of(node: &Node, sample: Option<u32>) -> Self {
         let controller = node.controller();
         let four = |v: &nalgebra::Vector4<f32>| [v.x, v.y, v.z, v.w].map(f64::from);
         Self {
@@ -65,6 +70,7 @@ impl Mind {
             qd: four(&controller.reference().qd),
             mode: controller.mode(),
             under_way: controller.under_way(),
+            sample,
         }
     }
 }
@@ -157,10 +163,10 @@ pub enum OperatorError {
         /// Longest wait.
         limit: Duration,
     },
-    /// The controller sends nothing any more.
-    #[error("the controller has been silent since {:.3} s", since.seconds())]
+    /// The controller tells nothing new any more.
+    #[error("the controller has been silent since {:.3} s, when its last new state came", since.seconds())]
     Silent {
-        /// Time of its last frame.
+        /// Time of its last new state.
         since: Instant,
     },
     /// The controller has started anew, and knows nothing of the move that it was asked for.

@@ -52,6 +52,7 @@ impl Bench {
             world: World {
                 plant: Plant::new(&model, START),
                 mind: Mind::BLANK,
+                sample: None,
                 clock: None,
                 cell_events: Vec::new(),
                 outcome: None,

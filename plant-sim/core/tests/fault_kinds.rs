@@ -69,6 +69,7 @@ fn survivors(fault: &str, count: u32, seed: u64) -> Vec<u32> {
     let mut world = World {
         plant: sim::plant::Plant::new(&config.actual, config.start),
         mind: Mind::BLANK,
+        sample: None,
         clock: None,
         cell_events: Vec::new(),
         outcome: None,

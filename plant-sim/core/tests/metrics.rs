@@ -39,6 +39,7 @@ fn sample(t: f64, tool: [f64; 4], moving: bool) -> Truth {
             qd: [0.0, 0.0, 0.0, f64::from(u8::from(moving))],
             mode: Mode::Enabled,
             under_way: None,
+            sample: Some(t as u32),
         },
     }
 }
@@ -169,4 +170,23 @@ fn plant_beyond_its_speed(model: &RobotModel, request: f64, limited: bool) {
     plant.set_speed([speed, 0.0, 0.0, 0.0]);
     plant.set_motor_torque([request, 0.0, 0.0, 0.0]);
     assert_eq!(plant.at_limit()[0], limited);
+}
+
+/// Half a millimetre off in every sample but the one that has no reference.
+#[test]
+fn a_sample_that_is_not_answered_has_no_error() {
+    let home = Plant::new(&RobotModel::irb_930_22_105(), [0.0; 4]).pose();
+    let tool = |off: f64| [home.x, home.y, home.z + off, home.yaw];
+    let mut metrics = metrics();
+    metrics.begin_cycle(None);
+    for (index, off) in [5e-4, 5e-4, 0.1, 5e-4].into_iter().enumerate() {
+        let mut truth = sample(index as f64, tool(off), true);
+        if index == 2 {
+            truth.mind.sample = None;
+        }
+        metrics.sample(&truth);
+    }
+    let error = metrics.tracking_error_mm();
+    assert!((error.max - 0.5).abs() < 1e-9, "{error:?}");
+    assert!((error.rms - 0.5).abs() < 1e-9, "{error:?}");
 }

@@ -11,7 +11,7 @@
 use sim::model::{Payload, RobotModel};
 use sim::plant::Plant;
 use sim::plant::brake::Brake;
-use sim::plant::defect::{BrakeDefect, EncoderDefect, LoadDefect};
+use sim::plant::defect::{BrakeDefect, EncoderDefect, LoadDefect, MotorDefect};
 
 const MS: u64 = 1_000_000;
 
@@ -166,4 +166,23 @@ fn a_spring_takes_up_the_energy_of_the_arm() {
         most = most.max(plant.energy().elastic);
     }
     assert!(most > 0.1 * kinetic, "{most} of {kinetic}");
+}
+
+/// The nut of the ball screw sits on the shaft that the wrist turns: by virtual work the wrist has the torque of both motors, each of which keeps
+/// to its limit.
+#[test]
+fn a_runaway_motor_keeps_to_its_limit_and_the_wrist_has_two() {
+    let model = RobotModel::irb_930_22_105();
+    let mut plant = plant();
+    let limit = model.drive.motor_torque_limit;
+    plant.set_torque_enabled(true);
+    plant.set_motor_torque([0.0, 0.0, 2.0 * limit[2], 0.0]);
+    plant.break_motor(3, Some(MotorDefect::Runaway));
+    assert_eq!(plant.motor_torque(), [0.0, 0.0, limit[2], limit[3]]);
+    let wrist = plant.joint_effort()[3];
+    let own = limit[3] * model.drive.gear_ratio[3];
+    let nut = limit[2] * model.drive.gear_ratio[2] * model.drive.screw_hand;
+    assert!((own - model.limits.effort[3]).abs() < 1e-12);
+    assert!((wrist - own - nut).abs() < 1e-12, "{wrist} {own} {nut}");
+    assert!(wrist > 1.1 * model.limits.effort[3], "{wrist}");
 }

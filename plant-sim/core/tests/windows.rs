@@ -211,6 +211,26 @@ fn a_fault_waits_for_another() {
     assert!(opened.is_some());
 }
 
+/// The second jump begins at 0.47 s.
+#[test]
+fn a_window_that_would_end_before_it_begins_does_not_come() {
+    let mut scenario = Scenario::built_in("gate").unwrap();
+    scenario.cycles = 1;
+    let (_, sound) = run_of(scenario.clone(), &["payload:dropped@100s"], 0);
+    for (fault, times) in [
+        ("motor:lift:dead@jump2+200ms..0.1s", 0),
+        ("motor:lift:dead@jump2..300samples", 0),
+        ("motor:lift:dead@jump2..0.471s", 1),
+    ] {
+        let (summary, record) = run_of(scenario.clone(), &[fault], 0);
+        let injected = &summary.injected[0];
+        assert_eq!(injected.times, times, "{fault}: {injected:?}");
+        assert_eq!(injected.from_s.is_some(), times > 0, "{fault}");
+        assert_eq!(injected.until_s.is_some(), times > 0, "{fault}");
+        assert_eq!(record.frames == sound.frames, times == 0, "{fault}");
+    }
+}
+
 #[test]
 fn a_window_that_means_nothing_is_refused_with_what_is_allowed() {
     for (window, expected) in [

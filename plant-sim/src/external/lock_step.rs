@@ -11,7 +11,6 @@ use protocol::table;
 use protocol::time::Instant;
 use sim::controller::COMPUTE;
 use sim::peer::{Outbox, Peer, PeerError};
-use sim::world::Mind;
 use sim::world::World;
 
 use super::peers::{self, sender};
@@ -173,7 +172,7 @@ impl Peer for LockStep {
             Some(frame) => self.exchange(now, frame)?,
         }
         out.extend(self.sent.drain(..).map(|frame| (now + COMPUTE, frame)));
-        world.mind = Mind::of(self.twin.node());
+        world.mind = self.twin.controller().mind();
         Ok(())
     }
 }

@@ -12,7 +12,6 @@ use protocol::frame::CanFrame;
 use protocol::messages::{Message, Node as Name};
 use protocol::time::{self, Instant, Period};
 use sim::peer::{Outbox, Peer, PeerError};
-use sim::world::Mind;
 use sim::world::World;
 use trace::difference::Difference;
 
@@ -177,7 +176,7 @@ impl Peer for RealTime {
         // Later frames must not overtake earlier ones.
         self.last = self.last.max(now + latency);
         out.extend(self.sent.drain(..).map(|frame| (self.last, frame)));
-        world.mind = Mind::of(self.twin.node());
+        world.mind = self.twin.controller().mind();
         Ok(())
     }
 }

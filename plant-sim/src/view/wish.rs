@@ -160,6 +160,11 @@ impl Asked {
                 when,
                 seconds,
             } => {
+                if *seconds < 0.0 {
+                    return Err(format!(
+                        "seconds is {seconds}; allowed: a time, or 0 for what stays broken"
+                    ));
+                }
                 let seconds = (*seconds > 0.0).then_some(*seconds);
                 let (_, event) =
                     (MOMENTS.iter().find(|(name, _)| name == when)).ok_or_else(|| {

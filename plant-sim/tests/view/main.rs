@@ -188,6 +188,10 @@ fn another_host_another_origin_and_no_token_are_refused() {
             "there is no axis",
         ),
         (
+            r#"{"fault":{"fault":"encoder:elbow:stuck","when":"at once","seconds":-1}}"#,
+            "seconds is -1; allowed: a time, or 0 for what stays broken",
+        ),
+        (
             r#"{"jog":{"axis":"elbow","step":1,"sign":1,"speed":10}}"#,
             "have sent no feedback yet",
         ),

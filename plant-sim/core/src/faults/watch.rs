@@ -97,7 +97,12 @@ impl Watch {
         let window = match moment {
             Some((after, end)) if is_meant => {
                 let from = now + after.time(self.period);
-                (from, end.of(from, self.period))
+                let until = end.of(from, self.period);
+                // One that would end before it begins does not come.
+                if until <= from {
+                    return false;
+                }
+                (from, until)
             }
             Some(_) => before,
             // One that goes on is left as it is.

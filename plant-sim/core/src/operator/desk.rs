@@ -7,8 +7,9 @@ use protocol::frame::CanFrame;
 use protocol::messages::{Message, Mode, MotionRequest, Operation, Outcome, State};
 use protocol::time::Instant;
 
+use super::news::SILENCE_LIMIT;
 use super::program::{Action, Program, announcement};
-use super::{Operator, Progress, SILENCE_LIMIT};
+use super::{Operator, Progress};
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::refusal::sentence;
 use crate::scenario::{PayloadSpec, Scenario};

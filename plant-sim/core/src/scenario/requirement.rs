@@ -101,13 +101,14 @@ pub(crate) enum Measured {
 }
 
 quantities! {
-    /// Distance of true and commanded tool at the same instant, while the reference moves, mm.
+    /// Distance of true and commanded tool at the same instant, while the reference moves, mm. Samples that the controller has not answered by
+    /// the next one are left out.
     TrackingMm = "tracking_error_mm", "mm", Arm;
-    /// Difference of true and commanded yaw at the same instant, while the reference moves, mrad.
+    /// Difference of true and commanded yaw at the same instant, while the reference moves, mrad; without the same samples.
     TrackingMrad = "tracking_error_mrad", "mrad", Arm;
-    /// Reference minus actual position of an axis that turns, mrad.
+    /// Reference minus actual position of an axis that turns, mrad; without the same samples.
     FollowingMrad = "following_error_mrad", "mrad", Turning;
-    /// Reference minus actual position of the lift, mm.
+    /// Reference minus actual position of the lift, mm; without the same samples.
     FollowingMm = "following_error_mm", "mm", Arm;
     /// Distance from the target at the end of a cycle, mm.
     FinalMm = "final_error_mm", "mm", Arm;
