@@ -2,10 +2,11 @@
 //!
 //! ```text
 //! case      situations x faults x windows, and each case of them
-//! expect    by when a fault has to be detected, and which ones a sound system survives
+//! expect    by when a fault has to be detected, and which ones a sound system survives (what each may be told as in causes)
 //! bounds    how far, fast and deep the arm may go, from the robot's own limits
 //! spells    the faults of a case, each with its time
-//! judge     the observer who compares a run with both (what the drives obey in newest, its measure of the lift in lift)
+//! judge     the observer who compares a run with both (what the drives obey in newest, the operator's last
+//!           request in request, its measure of the lift in lift)
 //! verdict   what a case is held to, and what became of it
 //! trial     one case: the run, what follows it, and the verdict
 //! tally     worst cases by fault and situation, and the bound of the miss rate
@@ -16,10 +17,12 @@
 
 pub mod bounds;
 pub mod case;
+mod causes;
 pub mod expect;
 pub mod judge;
 mod lift;
 mod newest;
+mod request;
 pub mod spells;
 pub mod tally;
 pub mod trial;

@@ -53,7 +53,9 @@ enum Defect {
     Mute,
     LateReport,
     FalseReport,
+    Misnamed,
     // In what it hears.
+    BrakeUnwatched,
     DamageUnseen,
     OldFramesTaken,
     Distracted,
@@ -62,7 +64,7 @@ enum Defect {
 }
 
 /// Each with the requirement that it breaks.
-const DEFECTS: [(Defect, Requirement); 21] = [
+const DEFECTS: [(Defect, Requirement); 23] = [
     (Defect::FollowingErrorUnwatched, Requirement::Reported),
     (Defect::SlowMonitor, Requirement::Reported),
     (Defect::BadFramesIgnored, Requirement::Detected),
@@ -80,6 +82,8 @@ const DEFECTS: [(Defect, Requirement); 21] = [
     (Defect::Mute, Requirement::Detected),
     (Defect::LateReport, Requirement::Detected),
     (Defect::FalseReport, Requirement::NoFalseAlarm),
+    (Defect::Misnamed, Requirement::Cause),
+    (Defect::BrakeUnwatched, Requirement::Detected),
     (Defect::DamageUnseen, Requirement::Detected),
     (Defect::OldFramesTaken, Requirement::Detected),
     (Defect::Distracted, Requirement::NoFalseAlarm),
@@ -142,7 +146,12 @@ impl Planted {
             }
             // A brake that it looked at would not be let go of.
             (
-                Some(Defect::NoWaitForTheBrake | Defect::BrakeForgotten | Defect::BrakeLate),
+                Some(
+                    Defect::NoWaitForTheBrake
+                    | Defect::BrakeForgotten
+                    | Defect::BrakeLate
+                    | Defect::BrakeUnwatched,
+                ),
                 Ok(Message::Feedback(mut feedback)),
             ) => {
                 feedback.status = feedback.status.with(DriveStatus::BRAKE_RELEASED, false);
@@ -177,6 +186,11 @@ impl Planted {
                 }
             }
             Message::Emergency(..) if self.defect == Some(Defect::Mute) => {}
+            Message::Emergency(..) if self.defect == Some(Defect::Misnamed) => {
+                let message =
+                    Message::Emergency(Node::Controller, Emergency::new(Cause::Overload, 0));
+                out.push((time, self.encoder.encode(&message).unwrap()));
+            }
             Message::Emergency(..) if self.defect == Some(Defect::LateReport) => {
                 out.push((time + Duration::from_millis(10), frame));
             }

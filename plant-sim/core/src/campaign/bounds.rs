@@ -5,6 +5,7 @@
 //! | no motor is asked for more than its peak torque | model |
 //! | an axis off its reference, too fast or out of its range is reported at the 4th sample in a row | default parameters: three samples, and one to answer |
 //! | torque is off 0.7 s after a fault was reported, with 22 kg | 1.25 times the time in which the slowest axis of the stretched arm stops from full speed with the torque that its weight leaves, and the time of the brake |
+//! | a brake that stays open is reported 60 ms and 8 samples after it was to close | the time of the brake, and of two controllers' answers |
 //! | while torque is on after that, the tool travels no further than at its greatest speed for the time of such a stop | the same |
 //! | no kinetic energy beyond that of all axes at 1.1 times their speed limit | the monitor's speed limit |
 //! | once torque is off, no kinetic energy but from the weight of the lift | nothing else drives the arm |
@@ -12,8 +13,10 @@
 //! | after standstill nothing moves by a tenth of a millimetre | what stands, stands |
 
 use nalgebra::Vector4;
+use protocol::time::Duration;
 
 use crate::model::{Payload, RobotModel};
+use crate::observer::Truth;
 use crate::plant::arm::{Arm, Configuration};
 use crate::plant::brake::Brake;
 use crate::plant::drive::Drive;
@@ -28,7 +31,7 @@ const RANGE_MARGIN: [f64; 4] = [0.02, 0.02, 0.002, 0.05];
 /// Speed that stops the arm, as a multiple of the axis' limit.
 const SPEED_FACTOR: f64 = 1.1;
 /// Consecutive samples beyond a limit until it is reported, the sample of the answer included.
-pub const SAMPLES_TO_REPORT: u32 = 4;
+const SAMPLES_TO_REPORT: u32 = 4;
 /// Samples from a report until the brake is told at the latest: the drives hold a command for 5 samples, and a stop that an axis does
 /// not follow is given up at the 4th sample.
 const SAMPLES_TO_BRAKE: f64 = 8.0;
@@ -82,8 +85,19 @@ impl Bounds {
         both.all(|(asked, limit)| f64::from(asked.abs()) <= limit * (1.0 + ROUNDING))
     }
 
+    /// Whether an axis has been off its reference, too fast, or out of its range for so many samples in a row that it has to have been
+    /// reported; `counts` counts them.
+    pub fn is_long_beyond(&self, counts: &mut [u32; 3], truth: &Truth) -> bool {
+        let Truth { plant, mind } = truth;
+        let beyond = self.is_beyond(&plant.q, &plant.qd, &mind.q);
+        for (count, is_beyond) in counts.iter_mut().zip(beyond) {
+            *count = if is_beyond { *count + 1 } else { 0 };
+        }
+        counts.iter().any(|count| *count > SAMPLES_TO_REPORT)
+    }
+
     /// Whether an axis is off its reference, too fast, or out of its range.
-    pub fn is_beyond(&self, q: &[f64; 4], qd: &[f64; 4], reference: &[f64; 4]) -> [bool; 3] {
+    fn is_beyond(&self, q: &[f64; 4], qd: &[f64; 4], reference: &[f64; 4]) -> [bool; 3] {
         let limits = &self.model.limits;
         let any = |of: &dyn Fn(usize) -> bool| (0..4).any(of);
         [
@@ -142,6 +156,11 @@ impl Bounds {
     /// Longest time from a report until torque is off, s.
     pub fn torque_off_s(&self) -> f64 {
         self.stop_s() + BRAKE_WAIT_S + SAMPLES_TO_BRAKE * self.period
+    }
+
+    /// Longest time from the command to close the brake until one that stays open is reported.
+    pub fn brake_told(&self) -> Duration {
+        Duration::from_seconds(BRAKE_WAIT_S + SAMPLES_TO_BRAKE * self.period)
     }
 
     /// Longest time of a controlled stop, s.

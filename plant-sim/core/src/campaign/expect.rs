@@ -25,7 +25,14 @@
 //! | the same for 350 ms or more; the operator silent for as long | 250 ms and 13 samples | one that was heard is waited for so long, looked at in every tenth sample |
 //! | nobody tells a CAN controller to recover | the same as without it | nothing by itself: only after a bus-off |
 //!
-//! Whatever else breaks is judged by its effect: see [`super::bounds`].
+//! | a motor that gives its peak torque for 600 ms or more | 600 ms | no plan accelerates for longer than 0.47 s |
+//!
+//! Whatever else breaks has no limit of time of its own, because a sound system may survive it: an encoder that is stuck, slow, reversed or lacks
+//! a bit lies only as far as its axis moves; a motor that is dead or weak is missed only where torque is needed, and the plan slows down for what
+//! it lacks; a load within the margins of the model is carried; a brake is missed when it is to close; what a foreign node sends without the
+//! right CRC is dropped. Their limit is that of the effect, which is stricter: the controller closes its loops on the readings, so that an axis whose
+//! reading or torque is wrong leaves its reference in truth, and 4 samples later that has to be reported (see [`super::bounds`]). What is
+//! reported has to be a cause that they can have, and a run that ends early must not end untold (see `causes`).
 
 use protocol::messages::{Cause, Node};
 use protocol::schema::Content;
@@ -44,8 +51,11 @@ const SOUND_NOISE: f64 = 1.2e-6;
 /// What a crystal may be off by.
 const SOUND_CLOCK: f64 = 1e-4;
 
+/// From rest to full speed at peak torque takes the slowest axis 0.47 s; as long a plan may do the same. Then 100 ms lead away from it.
+const RUNAWAY: Duration = Duration::from_millis(600);
+
 /// Samples for which the drives hold a command.
-const HOLD_SAMPLES: u32 = 5;
+pub(super) const HOLD_SAMPLES: u32 = 5;
 
 /// What has to follow from a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,6 +129,9 @@ fn of(fault: &Spell, period: Period) -> Expected {
         What::Silent(Node::Controller) | What::Dead(_) => no_survival(by_length(0, 9, 8)),
         What::Babbling(_) => by_length(2, 9, 8),
         What::Wires(_) => or_bus_off(by_length(2, 9, 8)),
+        What::Motor(_, MotorDefect::Runaway) if lasts >= RUNAWAY => {
+            Expected::DetectedBy(fault.from + RUNAWAY)
+        }
         What::Motor(_, MotorDefect::Dip) => no_survival(by_length(0, 2, 4)),
         What::Clock(ClockDefect::Misses(1.0)) => no_survival(by_length(0, 9, 8)),
         What::Clock(ClockDefect::Drift(share)) if share.abs() <= SOUND_CLOCK => Expected::Survived,

@@ -4,21 +4,21 @@ use std::collections::BTreeSet;
 use std::io;
 
 use protocol::frame::CanFrame;
-use protocol::messages::{
-    Cause, Command, ControlWord, Emergency, Message, Mode, Motion, MotionRequest, Node,
-};
+use protocol::messages::{Cause, Command, ControlWord, Emergency, Message, Mode, Node};
 use protocol::time::{Duration, Instant, Period};
 use protocol::{codec, table};
 
-use super::bounds::{Bounds, SAMPLES_TO_REPORT, STANDING};
+use super::bounds::{Bounds, STANDING};
 use super::expect::{Expected, stops_under_control};
 use super::lift::Lift;
 use super::newest::Newest;
+use super::request::Request;
 use super::spells::Spells;
 use super::verdict::{Requirement, Verdict, round};
 use crate::maths::square;
 use crate::model::Payload;
 use crate::observer::{Observer, PlantState, Truth};
+use crate::scenario::Ending;
 use crate::setup::RunConfig;
 use crate::world::CellEvent;
 
@@ -49,8 +49,7 @@ pub struct Judge {
     reaction: Duration,
     missed: BTreeSet<Requirement>,
     newest: Newest,
-    /// Counter and sequence number of the operator's last request.
-    request: (u8, u8),
+    request: Request,
     report: Option<(Instant, Cause)>,
     /// Whether more was reported while the arm stopped, which closes the brake at once.
     escalated: bool,
@@ -73,6 +72,8 @@ pub struct Judge {
     lift: Lift,
     /// The arm when the run had ended.
     rest: Option<PlantState>,
+    /// How the scenario is to end.
+    ends: Ending,
     mode: Mode,
     survived: bool,
 }
@@ -94,7 +95,7 @@ impl Judge {
             missed: BTreeSet::new(),
             newest: Newest::new(period, !faults.lose_count()),
             faults,
-            request: (0, 0),
+            request: Request::default(),
             report: None,
             escalated: false,
             cut: None,
@@ -109,6 +110,7 @@ impl Judge {
             energy: 0.0,
             lift: Lift::default(),
             rest: None,
+            ends: scenario.ends,
             mode: Mode::Boot,
             survived: false,
         };
@@ -138,16 +140,20 @@ impl Judge {
 
     /// The scenario has ended, completed or not, and the arm has come to rest. What follows is to be still.
     pub fn ended(&mut self, completed: bool) {
-        self.survived = completed && self.first().is_none();
+        let told = self.report.map(|(_, cause)| cause);
+        self.survived = match self.ends {
+            Ending::Completed => completed && self.first().is_none(),
+            // Without a fault only the operator's emergency stop ends it like that.
+            Ending::Stopped => told == Some(Cause::EStop),
+        };
         self.rest = self.last;
         // Without feedback it may still be waiting for the brake.
         let is_latched = matches!(self.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop);
         if self.report.is_some() && !is_latched {
             self.miss(Requirement::Latch);
         }
-        let reported = self.report.map(|report| report.1);
         let is_early = self.first().is_some_and(|at| at < self.onset.seconds());
-        if is_early || !self.expected.allows(self.survived, reported) {
+        if is_early || !self.expected.allows(self.survived, told) {
             self.miss(Requirement::NoFalseAlarm);
         }
     }
@@ -155,41 +161,34 @@ impl Judge {
     /// The request to switch on that a latched fault has to refuse; `None` without one.
     pub fn temptation(&self) -> Option<CanFrame> {
         self.report?;
-        let (counter, sequence) = self.request;
-        let enable = Message::Motion(Motion {
-            sequence: sequence.wrapping_add(1),
-            request: MotionRequest::Enable,
-        });
-        codec::encode(&enable, counter.wrapping_add(1)).ok()
+        self.request.enable()
     }
 
     /// The verdict.
     pub fn finish(mut self) -> Verdict {
         let onset = self.onset.seconds();
-        let since = |time: f64| Some(round((time - onset) * 1e3));
+        let told = self.report.map(|(_, cause)| cause);
+        let has_begun = self.onset < Instant::MAX;
+        let since = |time: f64| has_begun.then(|| round((time - onset) * 1e3));
         self.judge_fall();
+        self.missed
+            .extend(self.faults.judge_told(told, self.survived));
         let end = self.last.map_or(0.0, |last| last.t);
-        let is_commanded =
-            end - self.newest.time.seconds() < 5.0 * self.period.duration().seconds();
-        if self.report.is_some()
-            && !self.torque_holds
-            && is_commanded
-            && self.newest.control.contains(ControlWord::TORQUE_ENABLE)
-        {
+        if self.report.is_some() && !self.torque_holds && self.newest.enables_torque(end) {
             self.miss(Requirement::Standstill);
         }
         let stopped = self.detected.is_some();
         let at = self.first().filter(|at| *at >= onset);
         Verdict {
             survived: self.survived,
-            detected: match self.report {
-                Some((_, cause)) => Some(cause.name().into()),
+            detected: match told {
+                Some(cause) => Some(cause.name().into()),
                 None => self.cut.map(|_| "drives".into()),
             },
             detection_ms: at.and_then(since),
             standstill_ms: stopped.then_some(self.moving.max(onset)).and_then(since),
             distance_mm: stopped.then(|| round(self.distance * 1e3)),
-            energy_j: (self.onset < Instant::MAX).then(|| round(self.energy)),
+            energy_j: has_begun.then(|| round(self.energy)),
             drop_mm: stopped.then(|| round(self.lift.drop() * 1e3)),
             missed: self.missed,
         }
@@ -229,17 +228,6 @@ impl Judge {
             && !before.contains(ControlWord::TORQUE_ENABLE)
         {
             self.miss(Requirement::Latch);
-        }
-    }
-
-    fn watch_limits(&mut self, truth: &Truth) {
-        let Truth { plant, mind } = truth;
-        let beyond = self.bounds.is_beyond(&plant.q, &plant.qd, &mind.q);
-        for (count, is_beyond) in self.beyond.iter_mut().zip(beyond) {
-            *count = if is_beyond { *count + 1 } else { 0 };
-        }
-        if self.beyond.iter().any(|count| *count > SAMPLES_TO_REPORT) {
-            self.miss(Requirement::Reported);
         }
     }
 
@@ -317,11 +305,9 @@ impl Judge {
         if !went_on && self.lift.drop() > allowed {
             self.miss(Requirement::Drop);
         }
-        let is_controlled = self.cut.is_none()
-            && !self.escalated
-            && self
-                .report
-                .is_some_and(|(_, cause)| stops_under_control(cause));
+        let told = self.report.map(|(_, cause)| cause);
+        let is_controlled =
+            self.cut.is_none() && !self.escalated && told.is_some_and(stops_under_control);
         if is_controlled && self.lift.sunk() > STANDING {
             self.miss(Requirement::Drop);
         }
@@ -330,9 +316,11 @@ impl Judge {
 
 impl Observer for Judge {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
-        // Feedback are the most frames, and the longest.
-        let decoded = (!table::FEEDBACK.identifies(frame)).then(|| codec::decode(frame));
-        let Some(Ok(received)) = decoded else {
+        // Most frames, and the longest, are feedback, which is looked at for the brake only.
+        if table::FEEDBACK.identifies(frame) && self.newest.releases_brake() {
+            return Ok(());
+        }
+        let Ok(received) = codec::decode(frame) else {
             return Ok(());
         };
         match received.message {
@@ -343,8 +331,17 @@ impl Observer for Judge {
                 self.escalated |= self.report.is_some();
                 self.report.get_or_insert((time, cause));
             }
+            Message::Feedback(feedback) => {
+                let open = self.newest.brake_open(time, feedback.status);
+                if open > self.bounds.brake_told() && self.first().is_none() {
+                    self.miss(Requirement::Detected);
+                }
+            }
             Message::Motion(motion) => {
-                self.request = (received.counter.unwrap_or(0), motion.sequence);
+                self.request = Request {
+                    counter: received.counter.unwrap_or(0),
+                    sequence: motion.sequence,
+                };
             }
             _ => {}
         }
@@ -359,8 +356,12 @@ impl Observer for Judge {
         {
             self.cut.get_or_insert(plant.t);
         }
-        if is_powered && self.first().is_none() && truth.mind.knows_where() {
-            self.watch_limits(truth);
+        if is_powered
+            && self.first().is_none()
+            && truth.mind.knows_where()
+            && self.bounds.is_long_beyond(&mut self.beyond, truth)
+        {
+            self.miss(Requirement::Reported);
         }
         let now = Instant::ORIGIN + Duration::from_seconds(plant.t);
         if let Expected::DetectedBy(due) = self.expected

@@ -1,9 +1,9 @@
 //! The command that the drives obey.
 
-use protocol::messages::{Command, ControlWord};
-use protocol::time::{Instant, Period};
+use protocol::messages::{Command, ControlWord, DriveStatus};
+use protocol::time::{Duration, Instant, Period};
 
-use super::expect::is_taken;
+use super::expect::{HOLD_SAMPLES, is_taken};
 
 /// A command that is older than the newest by so many samples answers drives that have started anew.
 const RESTARTED: u32 = 100;
@@ -18,6 +18,8 @@ pub(super) struct Newest {
     /// The sample that it answers.
     sample: Option<u32>,
     period: Period,
+    /// Since when the brake is open that is to be closed.
+    open: Option<Instant>,
     /// Whether the number of a sample tells its time.
     counts: bool,
 }
@@ -29,6 +31,7 @@ impl Newest {
             time: Instant::ORIGIN,
             sample: None,
             period,
+            open: None,
             counts,
         }
     }
@@ -44,6 +47,29 @@ impl Newest {
         }
         self.sample = Some(command.sample);
         self.time = time;
+        if command.control.contains(ControlWord::BRAKE_RELEASE) {
+            self.open = None;
+        }
         Some(std::mem::replace(&mut self.control, command.control))
+    }
+
+    /// Whether the brake is to be open.
+    pub(super) fn releases_brake(&self) -> bool {
+        self.control.contains(ControlWord::BRAKE_RELEASE)
+    }
+
+    /// How long the brake has been open by then that is to be closed, by what the drives say.
+    pub(super) fn brake_open(&mut self, time: Instant, status: DriveStatus) -> Duration {
+        if self.releases_brake() || !status.contains(DriveStatus::BRAKE_RELEASED) {
+            self.open = None;
+            return Duration::ZERO;
+        }
+        time.since(*self.open.get_or_insert(time))
+    }
+
+    /// Whether at this time (s) it is still obeyed, and lets the motors have torque.
+    pub(super) fn enables_torque(&self, now: f64) -> bool {
+        let hold = f64::from(HOLD_SAMPLES) * self.period.duration().seconds();
+        now - self.time.seconds() < hold && self.control.contains(ControlWord::TORQUE_ENABLE)
     }
 }

@@ -1,9 +1,11 @@
 //! The faults of a case, each with the time in which it is in effect.
 
-use protocol::messages::Node;
+use protocol::messages::{Cause, Node};
 use protocol::time::{Duration, Instant, Period};
 
+use super::causes;
 use super::expect::{Expected, expected, lateness};
+use super::verdict::Requirement;
 use crate::faults::{Fault, What};
 use crate::model::Payload;
 use crate::plant::defect::{BrakeDefect, LoadDefect, burdened};
@@ -61,6 +63,20 @@ impl Spells {
     /// How late a command may be for them.
     pub(super) fn lateness(&self) -> Duration {
         lateness(&self.all, self.period)
+    }
+
+    /// What is wrong with what the controller has told in the end: the first cause, or none.
+    pub(super) fn judge_told(&self, told: Option<Cause>, survived: bool) -> Option<Requirement> {
+        let Some(cause) = told else {
+            let is_silent = !survived && !self.any(causes::may_be_untold);
+            return is_silent.then_some(Requirement::Detected);
+        };
+        let begun = self.all.iter().filter(|spell| spell.from < Instant::MAX);
+        let mut causes = begun.map(|spell| causes::of(spell.what));
+        // An emergency stop is the operator's.
+        let may_be = cause == Cause::EStop
+            || causes.any(|causes| causes.is_none_or(|causes| causes.contains(&cause)));
+        (!may_be).then_some(Requirement::Cause)
     }
 
     fn any(&self, is: impl Fn(What) -> bool) -> bool {

@@ -13,8 +13,10 @@ use serde::{Deserialize, Serialize};
 pub enum Requirement {
     /// No stop where nothing is wrong, or not yet, and none for what a sound system survives.
     NoFalseAlarm,
-    /// Faults with a limit of time are detected within it.
+    /// Faults with a limit of time are detected within it, and nothing ends a run untold.
     Detected,
+    /// What is told is what broke, or what follows from it.
+    Cause,
     /// An axis off its reference, too fast or out of its range is reported at once.
     Reported,
     /// The first command after the report stops the arm, at most one sample later.
@@ -41,6 +43,7 @@ impl Requirement {
         match self {
             Self::NoFalseAlarm => "no-false-alarm",
             Self::Detected => "detected",
+            Self::Cause => "cause",
             Self::Reported => "reported",
             Self::Reaction => "reaction",
             Self::Torque => "torque",

@@ -2,7 +2,7 @@
 
 use oorandom::Rand64;
 use protocol::codec;
-use protocol::frame::CanFrame;
+use protocol::frame::{CanFrame, FD_MAX};
 use protocol::schema::MessageInfo;
 use protocol::time::{Instant, Period};
 
@@ -49,19 +49,19 @@ impl Impostor {
         match self.disguise {
             Disguise::Poor => {
                 let blank = self.message.specimen()?;
-                let random = &mut self.random;
-                let data = blank.data().iter();
-                let data: Vec<u8> = data.map(|_| random.rand_range(0..256) as u8).collect();
-                Some(like(&blank, &data))
+                let data = &mut [0; FD_MAX][..blank.data().len()];
+                data.fill_with(|| self.random.rand_range(0..256) as u8);
+                Some(like(&blank, data))
             }
             Disguise::Perfect => {
                 let (frame, counter) = self.last.as_mut()?;
                 *counter = counter.wrapping_add(1);
-                let mut data = frame.data().to_vec();
+                let data = &mut [0; FD_MAX][..frame.data().len()];
+                data.copy_from_slice(frame.data());
                 if let Some(profile) = self.message.protection {
-                    profile.protect(self.message.id, *counter, &mut data);
+                    profile.protect(self.message.id, *counter, data);
                 }
-                Some(like(frame, &data))
+                Some(like(frame, data))
             }
         }
     }

@@ -1,0 +1,181 @@
+//! What a fault may be told as: written by hand from docs/safety.md and docs/faults.md, by what breaks and what follows from it.
+//!
+//! A cause that is not among those of its faults sends whoever mends the robot to the wrong place.
+
+use protocol::messages::{Cause, Node};
+use protocol::schema::Content;
+
+use super::bounds::FOLLOWING_ERROR;
+use crate::bus::ErrorKind;
+use crate::clock::ClockDefect;
+use crate::faults::{Disguise, FrameFault, What};
+use crate::plant::defect::{BrakeDefect, EncoderDefect, LoadDefect, MotorDefect};
+
+/// No feedback comes. The drives have let go by the time at which they are heard again, but the gap is what is felt first.
+const GAP: &[Cause] = &[Cause::FeedbackLost, Cause::PeerSilent];
+/// No command arrives. Feedback goes on, and says that the drives have let go.
+const LET_GO: &[Cause] = &[Cause::DriveFault];
+/// Feedback is held up, its sender does not miss it: what is told depends on which frame comes first.
+const HELD_UP: &[Cause] = &[Cause::FeedbackLost, Cause::PeerSilent, Cause::DriveFault];
+/// Attempts in vain take a node off the bus; its frames are held up.
+const OFF_THE_BUS: &[Cause] = &[
+    Cause::BusOff,
+    Cause::FeedbackLost,
+    Cause::PeerSilent,
+    Cause::DriveFault,
+];
+/// Counter or sample of the feedback stand or go backwards.
+const OLD: &[Cause] = &[Cause::Reordered];
+/// The loop closes on a reading that is not so.
+const LIE: &[Cause] = &[
+    Cause::EncoderFault,
+    Cause::StuckSensor,
+    Cause::Collision,
+    Cause::Chatter,
+    Cause::FollowingError,
+    Cause::OverSpeed,
+    Cause::SoftLimit,
+    // Readings off by as much as the axis moves in a whole number of samples look like ticks that were missed.
+    Cause::FeedbackLost,
+];
+/// An axis does not do what its torque should. One that stands at its limit, or goes away against its torque, looks like one whose encoder
+/// does, and gets the same stop.
+const FORCE: &[Cause] = &[
+    Cause::FollowingError,
+    Cause::OverSpeed,
+    Cause::OverTorque,
+    Cause::SoftLimit,
+    Cause::Overload,
+    Cause::Collision,
+    Cause::StuckSensor,
+    Cause::EncoderFault,
+];
+/// The same of an arm that carries another load than its model: its gains are wrong as well.
+const LOAD: &[Cause] = &[
+    Cause::FollowingError,
+    Cause::OverSpeed,
+    Cause::OverTorque,
+    Cause::Overload,
+    Cause::Collision,
+    Cause::StuckSensor,
+    Cause::EncoderFault,
+    Cause::Chatter,
+];
+
+/// Causes that may be told of this fault; `None` for what is not judged by its cause.
+pub(super) fn of(what: What) -> Option<&'static [Cause]> {
+    Some(match what {
+        What::Frames(info, kind) => return of_frames(info.content, kind),
+        What::Foreign(info, disguise) => match (info.content, disguise) {
+            (Content::Feedback, Disguise::Poor) => {
+                // On the beat of the drives' own, both read other bits than they send.
+                &[Cause::Corrupted, Cause::FeedbackLost, Cause::DriveFault]
+            }
+            (Content::Feedback, Disguise::Perfect) => {
+                &[Cause::Reordered, Cause::FeedbackLost, Cause::DriveFault]
+            }
+            (Content::Command, Disguise::Poor) => &[Cause::BusOff, Cause::DriveFault],
+            (_, Disguise::Perfect) if info.sender == Some(Node::Controller) => {
+                &[Cause::DuplicateNode]
+            }
+            _ => return None,
+        },
+        What::Silent(Node::Operator) => &[Cause::OperatorSilent],
+        What::Silent(Node::Drives) => GAP,
+        // It hears nothing of either.
+        What::Silent(Node::Controller) => &[
+            Cause::FeedbackLost,
+            Cause::PeerSilent,
+            Cause::OperatorSilent,
+        ],
+        // Drives that start anew begin with sample 0.
+        What::Dead(Node::Drives) => &[Cause::Reordered, Cause::FeedbackLost, Cause::PeerSilent],
+        What::Dead(_) => &[],
+        What::Babbling(_) => &[
+            Cause::Babbling,
+            Cause::FeedbackLost,
+            Cause::PeerSilent,
+            Cause::DriveFault,
+        ],
+        What::Wires(_) => OFF_THE_BUS,
+        What::Attempts(info, kind, share) => match (info.content, kind) {
+            (Content::Command, ErrorKind::Ack) => LET_GO,
+            // 32 attempts take less than the five samples for which the drives hold a command.
+            (Content::Command, _) if share >= 1.0 => &[Cause::BusOff],
+            (Content::Command, _) => &[Cause::BusOff, Cause::DriveFault],
+            // A passive transmitter repeats what the others have taken.
+            (Content::Feedback, ErrorKind::Ack) => OLD,
+            (Content::Feedback, _) => HELD_UP,
+            _ => return None,
+        },
+        What::Misreads(Node::Drives, _) => &[Cause::BusOff, Cause::DriveFault],
+        What::Misreads(Node::Controller, _) => GAP,
+        // After some ten error flags it is passive, and spoils nothing.
+        What::Misreads(Node::Operator, _) => &[],
+        What::NoRecovery(_) => &[],
+        What::Clock(ClockDefect::Drift(_)) => &[],
+        What::Clock(ClockDefect::Misses(share)) if share >= 1.0 => HELD_UP,
+        // A few can be told from the readings, many near each other cannot.
+        What::Clock(ClockDefect::Misses(_)) => {
+            &[Cause::FeedbackLost, Cause::Collision, Cause::EncoderFault]
+        }
+        // Further than any axis gets in a sample.
+        What::Encoder(axis, EncoderDefect::Jump(by)) if by.abs() > 2.0 * FOLLOWING_ERROR[axis] => {
+            &[Cause::EncoderFault]
+        }
+        What::Encoder(..) => LIE,
+        What::Motor(_, MotorDefect::Dip) => LET_GO,
+        What::Motor(..) => FORCE,
+        What::Brake(BrakeDefect::StuckOpen | BrakeDefect::Slow(_)) => &[Cause::DriveFault],
+        What::Brake(BrakeDefect::StuckClosed) => FORCE,
+        What::Brake(BrakeDefect::Stuck) => {
+            // Closed, it is felt when the arm is to move.
+            &[
+                Cause::DriveFault,
+                Cause::Collision,
+                Cause::StuckSensor,
+                Cause::FollowingError,
+                Cause::OverTorque,
+            ]
+        }
+        What::Load(LoadDefect::Dropped | LoadDefect::Heavier(_) | LoadDefect::Caught(_)) => LOAD,
+    })
+}
+
+fn of_frames(content: Content, kind: FrameFault) -> Option<&'static [Cause]> {
+    Some(match (content, kind) {
+        (_, FrameFault::Duplicate) => &[],
+        (Content::Feedback, FrameFault::Loss(_) | FrameFault::Burst(..)) => GAP,
+        (Content::Feedback, FrameFault::Corrupt(_)) => &[Cause::Corrupted],
+        (Content::Feedback, FrameFault::Replay(_) | FrameFault::Reorder(_)) => OLD,
+        (Content::Feedback, FrameFault::Delay(_)) => HELD_UP,
+        (Content::Feedback, FrameFault::Jitter(_)) => &[
+            Cause::Reordered,
+            Cause::FeedbackLost,
+            Cause::PeerSilent,
+            Cause::DriveFault,
+        ],
+        (Content::Command, _) => LET_GO,
+        (Content::Heartbeat(Node::Drives), _) => &[Cause::PeerSilent],
+        (Content::Heartbeat(Node::Operator), _) => &[Cause::OperatorSilent],
+        _ => return None,
+    })
+}
+
+/// Whether such a fault may end a run without a word of the controller: nobody is there to command the arm, or to be told.
+pub(super) fn may_be_untold(what: What) -> bool {
+    match what {
+        What::Silent(Node::Operator)
+        | What::Misreads(Node::Operator, _)
+        | What::Babbling(_)
+        | What::Wires(_)
+        | What::NoRecovery(Node::Controller)
+        | What::Silent(Node::Controller)
+        | What::Dead(Node::Controller) => true,
+        What::Frames(info, _) | What::Foreign(info, _) | What::Attempts(info, ..) => !matches!(
+            info.content,
+            Content::Feedback | Content::Command | Content::Heartbeat(_)
+        ),
+        _ => false,
+    }
+}
