@@ -80,9 +80,22 @@ slurm "$(plant-sim campaign missing slurm)" 4
 plant-sim campaign merge slurm | cmp - whole.jsonl
 stop_slurm
 
-echo "- through Snakemake"
+echo "- through Snakemake, with its report, and a second time without one of the results"
 need_python snakemake==9.16.3
 mkdir snake
-(cd snake && "$python" -m snakemake --snakefile "$campaign/Snakefile" --cores 2 --quiet all \
-    --config plan="$work/plan.jsonl" parts=3 >"$work/snakemake.err" 2>&1)
+snakemake() {
+    (cd snake && "$python" -m snakemake --snakefile "$campaign/Snakefile" --cores 2 "$@" --config plan="$work/plan.jsonl" parts=3 \
+        >"$work/snakemake.err" 2>&1)
+}
+snakemake report
 cmp snake/merged.jsonl whole.jsonl
+plant-sim campaign report whole.jsonl >report.md || [ $? = 1 ]
+cmp snake/report.md report.md
+rm snake/results/results-1-of-3.jsonl snake/merged.jsonl snake/report.md
+stat -c '%n %y' snake/results/* >kept
+snakemake report
+# One part, the merge and the report.
+grep -qx '3 of 3 steps (100%) done' "$work/snakemake.err"
+stat -c '%n %y' snake/results/* | grep -v -e -1-of- | cmp - kept
+cmp snake/merged.jsonl whole.jsonl
+cmp snake/report.md report.md
