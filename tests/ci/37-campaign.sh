@@ -23,15 +23,49 @@ for part in 0 1; do
 done
 plant-sim campaign merge parts | cmp - whole.jsonl
 
-echo "- killed at any moment"
-for _ in 1 2 3 4 5 6; do
-    plant-sim campaign run plan.jsonl --out killed --resume 2>"$work/killed.err" &
-    sleep "$((RANDOM % 2)).$((RANDOM % 10))5"
-    kill -KILL $! 2>/dev/null || true
-    wait $! 2>/dev/null || true
+echo "- killed a hundred times, at any moment"
+# Cases of a millisecond, so that a batch of them is soon on disk: on two cores 61 batches, of which fewer than half are done after a
+# hundred kills, most of which come before the end of a batch.
+cat >short.toml <<'END'
+faults = ["encoder:elbow:jump=0.2", "encoder:lift:noise=0.05"]
+lasts_ms = [0]
+[[situation]]
+name = "standing"
+scenario = "gate"
+set = ["cycles=1", "cycle=[{ dwell = 0.1 }]"]
+begin_ms = { from = 100, until = 130, step = 0.01 }
+END
+plant-sim campaign plan --cases short.toml >short.jsonl
+began=${EPOCHREALTIME/./}
+plant-sim campaign run short.jsonl --jobs 2 --out undisturbed >/dev/null 2>"$work/undisturbed.err"
+batch=$(((${EPOCHREALTIME/./} - began) / 61))
+mkdir killed
+saved() { find killed -type f -exec cat {} + | wc -l; }
+part=0 kills=0 progress=0
+while [ $kills -lt 100 ]; do
+    [ $part -lt 4 ] || fail "all was done after $kills kills"
+    before=$(saved)
+    plant-sim campaign run short.jsonl --jobs 2 --shard $part/4 --out killed --resume >/dev/null 2>"$work/killed.err" & run=$!
+    sleep "$((RANDOM * 8 * batch / 5 / 32768))e-6"
+    kill -KILL $run 2>/dev/null || true
+    status=0
+    wait $run 2>/dev/null || status=$?
+    if [ $status = 137 ]; then
+        kills=$((kills + 1)) progress=$((progress + ($(saved) > before)))
+        [ ! -e killed/results-$part-of-4.jsonl ] || part=$((part + 1))
+    else
+        # It was faster than its end.
+        [ $status = 0 ] && [ -e killed/results-$part-of-4.jsonl ] || fail "a run that was to be killed: status $status"
+        part=$((part + 1))
+    fi
 done
-judged plant-sim campaign run plan.jsonl --out killed --resume
-plant-sim campaign merge killed | cmp - whole.jsonl
+[ $progress -ge 10 ] || fail "only $progress of $kills killed runs had saved anything"
+for part in 0 1 2 3; do
+    plant-sim campaign run short.jsonl --jobs 2 --shard $part/4 --out killed --resume >/dev/null 2>"$work/killed.err"
+done
+plant-sim campaign merge undisturbed >undisturbed.jsonl
+plant-sim campaign merge killed | cmp - undisturbed.jsonl
+echo "  $kills runs killed, $progress of them with new results; the same in the end"
 
 echo "- as a job array of Slurm, one task of which is lost and run again"
 need_slurm
@@ -46,9 +80,22 @@ slurm "$(plant-sim campaign missing slurm)" 4
 plant-sim campaign merge slurm | cmp - whole.jsonl
 stop_slurm
 
-echo "- through Snakemake"
+echo "- through Snakemake, with its report, and a second time without one of the results"
 need_python snakemake==9.16.3
 mkdir snake
-(cd snake && "$python" -m snakemake --snakefile "$campaign/Snakefile" --cores 2 --quiet all \
-    --config plan="$work/plan.jsonl" parts=3 >"$work/snakemake.err" 2>&1)
+snakemake() {
+    (cd snake && "$python" -m snakemake --snakefile "$campaign/Snakefile" --cores 2 "$@" --config plan="$work/plan.jsonl" parts=3 \
+        >"$work/snakemake.err" 2>&1)
+}
+snakemake report
 cmp snake/merged.jsonl whole.jsonl
+plant-sim campaign report whole.jsonl >report.md || [ $? = 1 ]
+cmp snake/report.md report.md
+rm snake/results/results-1-of-3.jsonl snake/merged.jsonl snake/report.md
+stat -c '%n %y' snake/results/* >kept
+snakemake report
+# One part, the merge and the report.
+grep -qx '3 of 3 steps (100%) done' "$work/snakemake.err"
+stat -c '%n %y' snake/results/* | grep -v -e -1-of- | cmp - kept
+cmp snake/merged.jsonl whole.jsonl
+cmp snake/report.md report.md
