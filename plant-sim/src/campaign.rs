@@ -4,6 +4,7 @@
 //! cases     what to cross, as TOML                       plan      the cases, one a line, with their hash
 //! shard     which part of a plan, and its file           work      a shard, on every core
 //! merge     shards put together, in the order of cases   shrink    the smallest fault that still fails
+//! picture   the worst cases, as SVG
 //! ```
 //!
 //! Everything streams: memory holds one batch of cases, however many there are. What a case comes to depends on the case alone,
@@ -11,6 +12,7 @@
 
 pub mod cases;
 pub mod merge;
+pub mod picture;
 pub mod plan;
 pub mod shard;
 pub mod shrink;
