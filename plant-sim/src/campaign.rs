@@ -4,7 +4,7 @@
 //! cases     what to cross, as TOML                       plan      the cases, one a line, with their hash
 //! shard     which part of a plan, and writing its file   results   reading and judging such a file
 //! work      a shard, on every core                       merge     shards put together, in the order of cases
-//! shrink    the smallest fault that still fails
+//! shrink    the smallest fault that still fails          picture   the worst cases, as SVG
 //! ```
 //!
 //! Everything streams: memory holds one batch of cases, however many there are. What a case comes to depends on the case alone,
@@ -12,6 +12,7 @@
 
 pub mod cases;
 pub mod merge;
+pub mod picture;
 pub mod plan;
 pub mod results;
 pub mod shard;

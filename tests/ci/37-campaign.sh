@@ -16,6 +16,8 @@ echo "- a thousand cases at once"
 judged plant-sim campaign run plan.jsonl --out whole
 plant-sim campaign merge whole >whole.jsonl
 [ "$(wc -l <whole.jsonl)" = 1001 ]
+judged plant-sim campaign report whole.jsonl --picture worst.svg >/dev/null
+grep -q '</svg>' worst.svg
 
 echo "- in two parts, one after the other"
 for part in 0 1; do

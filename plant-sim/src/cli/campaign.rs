@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use plant_sim::campaign::plan::{self, Plan};
 use plant_sim::campaign::shard::Shard;
-use plant_sim::campaign::{CampaignError, cases, merge, shrink, work};
-use plant_sim::report;
+use plant_sim::campaign::{CampaignError, cases, merge, picture, shrink, work};
 use plant_sim::run::{self, Recording};
 use plant_sim::say;
+use plant_sim::{output, report};
 use sim::campaign::case::Case;
 use sim::campaign::trial;
 use sim::campaign::verdict::Verdict;
@@ -20,7 +20,7 @@ use sim::controller::InProcess;
 use sim::curves::Curves;
 use sim::summary::Collector;
 
-use super::values::{count, jobs};
+use super::values::{count, jobs, svg};
 use super::{Failure, show};
 
 /// Subcommands of `campaign`.
@@ -89,6 +89,9 @@ pub(super) struct FoldersArgs {
 pub(super) struct ReportArgs {
     /// Merged results; - for standard input.
     results: PathBuf,
+    /// Write the worst cases as a picture, too.
+    #[arg(long, value_name = "FILE.svg", value_parser = svg)]
+    picture: Option<PathBuf>,
 }
 
 /// A case of a plan.
@@ -129,7 +132,7 @@ pub(super) fn run(command: &CampaignCommand) -> Result<(), Failure> {
             merge::merge(&args.folders, &mut io::sink())?;
             Ok(merge::merge(&args.folders, &mut output())?)
         }
-        CampaignCommand::Report(args) => report(&args.results),
+        CampaignCommand::Report(args) => report(args),
         CampaignCommand::Missing(args) => show(&(merge::missing(&args.folders)? + "\n")),
         CampaignCommand::Replay(args) => replay(args),
         CampaignCommand::Shrink(args) => shrink(args),
@@ -218,7 +221,8 @@ fn shard(given: Option<&str>, variable: impl Fn(&str) -> Option<String>) -> Resu
     }
 }
 
-fn report(path: &Path) -> Result<(), Failure> {
+fn report(args: &ReportArgs) -> Result<(), Failure> {
+    let path = args.results.as_path();
     if path.is_dir() {
         return Err(Failure::usage(format!(
             "{0} is a folder of results; merge them first: plant-sim campaign merge {0} | plant-sim campaign report -",
@@ -234,6 +238,9 @@ fn report(path: &Path) -> Result<(), Failure> {
         })?;
         merge::tally(path, file)?
     };
+    if let Some(file) = &args.picture {
+        output::write(file, &picture::page(&tally))?;
+    }
     show(&tally.to_string())?;
     match tally.missed() {
         0 => Ok(()),

@@ -35,24 +35,35 @@ struct Row {
     cases: u64,
     missed: u64,
     survived: u64,
-    detection_ms: Worst,
-    standstill_ms: Worst,
-    distance_mm: Worst,
-    energy_j: Worst,
-    drop_mm: Worst,
+    detection_ms: Greatest,
+    standstill_ms: Greatest,
+    distance_mm: Greatest,
+    energy_j: Greatest,
+    drop_mm: Greatest,
+}
+
+/// The worst case of a kind of fault in a situation; `None` where nothing had to stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worst {
+    /// Way of the tool until standstill, mm.
+    pub distance_mm: Option<f64>,
+    /// Greatest kinetic energy, J.
+    pub energy_j: Option<f64>,
+    /// Time until standstill, ms.
+    pub standstill_ms: Option<f64>,
 }
 
 /// The greatest of the values present.
 #[derive(Clone, Copy, Debug, Default)]
-struct Worst(Option<f64>);
+struct Greatest(Option<f64>);
 
-impl Worst {
+impl Greatest {
     fn add(&mut self, value: Option<f64>) {
         self.0 = [self.0, value].into_iter().flatten().reduce(f64::max);
     }
 }
 
-impl fmt::Display for Worst {
+impl fmt::Display for Greatest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             Some(value) => write!(f, "{value:.1}"),
@@ -98,6 +109,18 @@ impl Tally {
     /// Number of cases that missed a requirement.
     pub fn missed(&self) -> u64 {
         self.all.missed
+    }
+
+    /// The worst cases, with kind of fault and situation.
+    pub fn worst(&self) -> impl Iterator<Item = (&str, &str, Worst)> {
+        self.rows.iter().map(|((kind, situation), row)| {
+            let worst = Worst {
+                distance_mm: row.distance_mm.0,
+                energy_j: row.energy_j.0,
+                standstill_ms: row.standstill_ms.0,
+            };
+            (kind.as_str(), situation.as_str(), worst)
+        })
     }
 
     /// What was missed by which kind of fault.
