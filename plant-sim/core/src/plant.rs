@@ -372,8 +372,7 @@ impl Plant {
         self.given_torque(&self.drive.to_motor(&self.qd)).into()
     }
 
-    /// Present efforts of the motors at the joints, after all limits, N m and N. Each motor keeps to its limit; the wrist bears the torque
-    /// of the lift's nut as well.
+    /// Present efforts of the motors at the joints, after all limits, N m and N. The wrist bears the torque of the lift's nut as well.
     pub fn joint_effort(&self) -> [f64; 4] {
         self.drive.joint_effort(&self.motor_torque().into()).into()
     }

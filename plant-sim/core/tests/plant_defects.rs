@@ -168,8 +168,8 @@ fn a_spring_takes_up_the_energy_of_the_arm() {
     assert!(most > 0.1 * kinetic, "{most} of {kinetic}");
 }
 
-/// The nut of the ball screw sits on the shaft that the wrist turns: by virtual work the wrist has the torque of both motors, each of which keeps
-/// to its limit.
+/// The nut of the ball screw sits on the shaft that the wrist turns: by virtual work the wrist has the torque of both motors, each of which
+/// keeps to its limit.
 #[test]
 fn a_runaway_motor_keeps_to_its_limit_and_the_wrist_has_two() {
     let model = RobotModel::irb_930_22_105();
