@@ -9,6 +9,7 @@
 )]
 
 use std::net::TcpListener;
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
@@ -24,6 +25,7 @@ use plant_sim::replay::Replay;
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
 use protocol::time::{Instant, Period};
+use sim::faults::{KINDS, Kind};
 use sim::observer::{Observer, Truth};
 use sim::run::{in_process, with_controller};
 use sim::scenario::Scenario;
@@ -159,4 +161,124 @@ fn a_controller_that_goes_away_is_a_result() {
     let error = summary.error.unwrap();
     assert!(error.contains("has been silent since"), "{error}");
     assert!(summary.at_rest);
+}
+
+/// A fault of this kind, in effect while it matters, for some milliseconds.
+fn example(kind: &Kind) -> String {
+    let place = match kind.place {
+        "message" => "feedback",
+        "node" if kind.name == "no-recovery" => "controller",
+        "node" => "drives",
+        place => place,
+    };
+    let axis = if kind.has_axis { ":lift" } else { "" };
+    let value = match (kind.name, kind.value) {
+        ("burst", _) => "=0.5/4".into(),
+        (_, Some(value)) => format!("={}", value.moderate()),
+        (_, None) => String::new(),
+    };
+    let window = match kind.place {
+        // While the brake is closed and is to open.
+        "brake" => "0s..80ms",
+        _ => "400ms..408ms",
+    };
+    format!("{place}{axis}:{}{value}@{window}", kind.name)
+}
+
+/// What differs with an external controller in lock-step: its time stands still where no feedback arrives, and nobody tells it of a
+/// bus-off of the simulated bus. As docs/faults.md says.
+const DIFFERENT: [&str; 15] = [
+    "loss",
+    "delay",
+    "jitter",
+    "bit-error",
+    "stuff-error",
+    "form-error",
+    "crc-error",
+    "ack-error",
+    "silent",
+    "dead",
+    "babbling",
+    "no-recovery",
+    "dominant",
+    "recessive",
+    "misses",
+];
+
+#[test]
+fn every_kind_of_fault_acts_on_an_external_controller() {
+    let config = |faults: &[&str]| {
+        let mut scenario = Scenario::built_in("gate").unwrap();
+        scenario.cycles = 1;
+        scenario.faults = faults.iter().map(|text| text.parse().unwrap()).collect();
+        RunConfig::new(scenario)
+    };
+    let there = |faults: &[&str]| {
+        let (stop, client, thread) = serve(1000.0);
+        let mut seen = Seen::default();
+        let connect = |config| LockStep::connect(&client, config);
+        let summary = with_controller(&config(faults), connect, &mut (), &mut seen).unwrap();
+        stop.store(true, Ordering::Relaxed);
+        thread.join().unwrap();
+        // A stop is a result; a twin that differs is none.
+        let error = summary.error.unwrap_or_default();
+        assert!(
+            !error.contains("differs from its twin"),
+            "{faults:?}: {error}"
+        );
+        seen
+    };
+    let sound = there(&[]);
+    let mut different = Vec::new();
+    for kind in KINDS {
+        let text = example(&kind);
+        // Without a bus-off there is nothing to recover from.
+        let faults = match kind.name {
+            "no-recovery" => vec![text.as_str(), "command:bit-error@400ms..405ms"],
+            _ => vec![text.as_str()],
+        };
+        let external = there(&faults);
+        let mut internal = Seen::default();
+        in_process(&config(&faults), &mut internal).unwrap();
+        for seen in [&external, &internal] {
+            assert!(
+                seen.truth != sound.truth || seen.frames != sound.frames,
+                "{text}"
+            );
+        }
+        if external.frames != internal.frames || external.truth != internal.truth {
+            different.push(kind.name);
+        }
+    }
+    assert_eq!(different, DIFFERENT);
+}
+
+/// What only this machine could do is refused before anything is looked for on the bus.
+#[test]
+fn what_cannot_break_an_external_controller_is_refused_by_name() {
+    let lock_step = "an external controller has a power supply of its own; allowed: controller:silent, or --controller qemu";
+    let real_time =
+        "in real time samples are taken by the clock of this machine; allowed without --real-time";
+    for (fault, options, why) in [
+        ("controller:dead@0.4s..0.5s", &[][..], lock_step),
+        ("controller:dead@0.4s..0.5s", &["--real-time"], lock_step),
+        ("clock:drift=0.01@0.4s", &["--real-time"], real_time),
+        ("clock:misses@0.4s", &["--real-time"], real_time),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_plant-sim"))
+            .args([
+                "run",
+                "--controller",
+                "external",
+                "--bus",
+                "slcan:tcp:127.0.0.1:1",
+            ])
+            .args(["--fault", fault])
+            .args(options)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(&format!("fault {fault}: {why}")), "{said}");
+    }
 }

@@ -20,6 +20,18 @@ ended() { # ended NAME TEXT: the run has failed and has said why
 at_rest() { # at_rest NAME: the arm stands with its brake closed
     grep -q '"at_rest": true' "$1/summary.json" || fail "$1: the arm is not at rest"
 }
+watch() { # watch NAME: what is on the bus from now on, for no_torque
+    candump -L -r 67108864 "$interface" >"$1.log" & watcher=$!
+    eventually "candump listening" sockets 3
+}
+no_torque() { # no_torque NAME COUNT: of at least COUNT commands since, none switches torque on again, and the last has none
+    sleep 0.5
+    kill $watcher
+    # What was in the queue of a process that stood still is answered as if it were new, so that the first may have it.
+    "$plant_sim" trace decode --format jsonl "$1.log" 2>"$1.decode.err" | grep -o '"message":"Command".*"control":{"value":[^]]*]' >"$1.commands" || true
+    awk -v least="$2" '{ on = /torque/; again += on && NR > 1 && !was; was = on } END { exit NR < least || again || was }' "$1.commands" ||
+        fail "$1: torque after the pause, or fewer than $2 commands"
+}
 # A slow machine may stop the arm by itself, before anything is done to it: told as well.
 real=(--real-time --rate 100)
 begun="moving\|controller: fault"
@@ -55,10 +67,12 @@ for way in lock-step real-time; do
     await_controller "$begun"
     kill -STOP $controller
     sleep "$pause"
+    watch continued
     kill -CONT $controller
     ended controller-stands "late\|silent\|controller went to"
     at_rest controller-stands
     await_controller "controller: fault\|controller: estop"
+    no_torque continued 1
     passed "$way: the controller stood still for $pause s: the drives have stopped the arm, both say so"
 
     mark
@@ -67,6 +81,7 @@ for way in lock-step real-time; do
     kill -STOP $plant 2>/dev/null || true
     await_controller "controller: fault"
     sleep "$pause"
+    watch continued
     kill -CONT $plant 2>/dev/null || true
     if [ $way = lock-step ]; then
         has_said "fault: peer silent" || fail "the controller did not notice"
@@ -76,6 +91,7 @@ for way in lock-step real-time; do
         ended plant-stands "the controller went to fault"
         at_rest plant-stands
     fi
+    no_torque continued 1
     end_controller
     passed "$way: the plant stood still for $pause s: the controller has switched off and says so"
 done
@@ -110,6 +126,26 @@ if grep -q 'User Mode Linux' /proc/cpuinfo; then
     cmp clean/trace.log jumps/trace.log || fail "the clock has changed the run"
     end_controller
     passed "a clock that jumps an hour ahead and back changes no byte"
+
+    # In real time both wait for deadlines.
+    controller "${real[@]}"
+    await controller.err "waiting for the drives"
+    mark
+    plant "${real[@]}" --cycles 2 --out jumps >jumps.txt 2>jumps.err || true & plant=$!
+    await_controller "$begun"
+    for seconds in 3600 -7200 3600; do
+        date -s "@$(($(date +%s) + seconds))" >/dev/null
+        sleep 0.1
+    done
+    wait $plant
+    result=completed
+    grep -q '"completed": true' jumps/summary.json || result="ended: $(grep -m 1 'not completed' jumps.err)"
+    [ "$result" = completed ] || at_rest jumps
+    # Frame by frame, no time runs back or jumps.
+    tr -d '()' <jumps/trace.log | awk 'NR > 1 && ($1 < last || $1 > last + 5) { exit 1 } { last = $1 }' ||
+        fail "real time: the clock is in the trace"
+    end_controller
+    passed "the same in real time: $result"
 else
     echo "- not tested here: the clock of this machine is not set"
 fi
