@@ -17,3 +17,14 @@ trace=$work/run/trace.log
 "$plant_sim" dbc --out "$work/scara.dbc"
 "$python" tests/ci/20-dbc.py "$work/scara.dbc" "$plant_sim" "$work"
 "$python" tests/ci/21-dissector.py "$plant_sim" "$work" "$trace" "$work/random.log"
+
+# A bus-off, a passive node, and errors of every kind.
+errors=()
+begin=300
+for kind in stuff form crc ack; do
+    errors+=(--fault "feedback:$kind-error=0.3@${begin}ms..+10ms")
+    begin=$((begin + 10))
+done
+"$plant_sim" run --cycles 1 "${errors[@]}" --fault command:bit-error@400ms..+10ms --no-report --out "$work/errors" >/dev/null 2>"$work/errors.err" ||
+    [ $? = 1 ]
+"$python" tests/ci/21-errors.py "$plant_sim" "$work" "$work/errors/trace.log"
