@@ -88,8 +88,8 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
             Cause::PeerSilent,
             Cause::OperatorSilent,
         ],
-        // Drives that start anew begin with sample 0.
-        What::Dead(Node::Drives) => &[Cause::Reordered, Cause::FeedbackLost, Cause::PeerSilent],
+        // Drives that start anew begin with sample 0, and without torque.
+        What::Dead(Node::Drives) => &[Cause::DriveFault, Cause::FeedbackLost, Cause::PeerSilent],
         What::Dead(_) => &[],
         What::Babbling(_) => &[
             Cause::Babbling,
