@@ -282,7 +282,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::Babbling => "babbling: 40 frames in a row, limit 32 frames in a row".into(),
             Cause::BusOff => "bus off".into(),
             Cause::Overrun => "overrun: 5 samples in a row, limit 5 samples in a row".into(),
-            Cause::PeerSilent => "peer silent: 100.0 ms, limit 100.0 ms".into(),
+            Cause::PeerSilent => "peer silent: 100.001 ms, limit 100.000 ms".into(),
             Cause::OperatorSilent => "operator silent: 258.0 ms, limit 250.0 ms".into(),
             Cause::Reordered => "reordered: 3 frames in a row".into(),
             Cause::Corrupted => "corrupted: 3 frames in a row".into(),
