@@ -302,7 +302,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::EncoderFault => "encoder fault: drive status ready torque-on".into(),
             Cause::Collision => "collision, axis 3 (lift): 1874.9 N, limit 430.0 N".into(),
             Cause::Chatter => "chatter, axis 2 (elbow): 81 %, limit 80 %".into(),
-            Cause::Overload => "overload, axis 3 (lift): 120 %, limit 120 %".into(),
+            Cause::Overload => "overload, axis 3 (lift): 120.1 %, limit 120.0 %".into(),
             _ => String::new(),
         };
         assert_eq!(state.fault().to_string(), expected);

@@ -251,7 +251,8 @@ impl Observer for Collector {
         };
         match received.message {
             Message::Emergency(_, emergency) => {
-                if self.faults.emergency(time, &emergency) {
+                let is_first = self.faults.emergency(time, &emergency);
+                if is_first {
                     self.judge.fault(time);
                 }
             }

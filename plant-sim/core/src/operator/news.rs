@@ -31,7 +31,8 @@ impl Operator {
         };
         match received.message {
             Message::State(state) => {
-                if self.states.check(received.counter.unwrap_or(0)).is_new() {
+                let verdict = self.states.check(received.counter.unwrap_or(0));
+                if verdict.is_new() {
                     self.heard = now;
                     self.state = Some(state);
                 }
