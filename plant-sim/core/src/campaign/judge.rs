@@ -153,7 +153,7 @@ impl Judge {
             self.miss(Requirement::Latch);
         }
         let is_early = self.first().is_some_and(|at| at < self.onset.seconds());
-        if is_early || !self.expected.allows(self.survived, told) {
+        if (is_early && !self.survived) || !self.expected.allows(self.survived, told) {
             self.miss(Requirement::NoFalseAlarm);
         }
     }
