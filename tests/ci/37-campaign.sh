@@ -41,11 +41,17 @@ plant-sim campaign plan --cases short.toml >short.jsonl
 began=${EPOCHREALTIME/./}
 plant-sim campaign run short.jsonl --jobs 2 --out undisturbed >/dev/null 2>"$work/undisturbed.err"
 batch=$(((${EPOCHREALTIME/./} - began) / 61))
+plant-sim campaign merge undisturbed >undisturbed.jsonl
 mkdir killed
 saved() { find killed -type f -exec cat {} + | wc -l; }
 part=0 kills=0 progress=0
 while [ $kills -lt 100 ]; do
-    [ $part -lt 4 ] || fail "all was done after $kills kills"
+    if [ $part = 4 ]; then # a machine that is faster now than when it was measured
+        plant-sim campaign merge killed | cmp - undisturbed.jsonl
+        rm -r killed
+        mkdir killed
+        part=0
+    fi
     before=$(saved)
     plant-sim campaign run short.jsonl --jobs 2 --shard $part/4 --out killed --resume >/dev/null 2>"$work/killed.err" & run=$!
     sleep "$((RANDOM * 8 * batch / 5 / 32768))e-6"
@@ -65,7 +71,6 @@ done
 for part in 0 1 2 3; do
     plant-sim campaign run short.jsonl --jobs 2 --shard $part/4 --out killed --resume >/dev/null 2>"$work/killed.err"
 done
-plant-sim campaign merge undisturbed >undisturbed.jsonl
 plant-sim campaign merge killed | cmp - undisturbed.jsonl
 echo "  $kills runs killed, $progress of them with new results; the same in the end"
 
