@@ -109,6 +109,10 @@ pub struct Controller {
     too_fast: u8,
     /// Samples for which moves are still held in it.
     held: u16,
+    /// Share of its torques that the arm gets: they build up from enabling on.
+    built_up: f32,
+    /// Samples without torque in a row in which the brake was not closed either.
+    unheld: u32,
     /// First fault since the last reset.
     fault: Fault,
     /// Whether only the shaft is under torque until the brake has closed: shoulder or elbow has to be without.
@@ -162,6 +166,8 @@ impl Controller {
             limits: LimitFlags::EMPTY,
             operation: Operation::Automatic,
             held: 0,
+            built_up: 0.0,
+            unheld: 0,
             too_fast: 0,
             fault: Fault::NONE,
             limp: false,
@@ -213,6 +219,7 @@ impl Controller {
         self.watch(readings, &q, &qd);
         self.wait(readings);
         if !self.state.is_powered() {
+            self.watch_brake(readings);
             // No torque: follow the arm, so that enabling starts at its present position.
             self.setpoint = Setpoint::rest(q);
             self.queue.clear(&q);
@@ -310,17 +317,16 @@ impl Controller {
         }
     }
 
-    /// What of these motor torques the drives may have in the state that this sample has led to: none for the arm where it has to be without;
-    /// and while the brake opens as much as builds up in half of its time, as a step of the load's weight would shake the arm.
-    fn released(&self, torque: Vector4<f32>) -> Vector4<f32> {
-        match self.state {
-            State::Enabling(left) => {
-                let opening = self.setup.brake_delay / self.config.period.seconds();
-                torque * clamp(2.0 - 2.0 * left as f32 / opening, 0.0, 1.0)
-            }
-            _ if self.limp => of_shaft(torque),
-            _ => torque,
+    /// What of these motor torques the drives may have: none for the arm where it has to be without; and from enabling on as much as builds up
+    /// in half of the time of the brake, as a step of the load's weight would shake the arm.
+    fn released(&mut self, torque: Vector4<f32>) -> Vector4<f32> {
+        let torque = if self.limp { of_shaft(torque) } else { torque };
+        if self.built_up >= 1.0 {
+            return torque;
         }
+        let share = self.built_up;
+        self.built_up += 2.0 * self.config.period.seconds() / self.setup.brake_delay;
+        torque * share
     }
 
     /// Forgets what law and observer have gathered.

@@ -81,7 +81,7 @@ listed! {
 
 /// Every transition: from, on, to. An event without a row here changes nothing. The samples left of a state are 0 here;
 /// the controller sets them to the time of the brake on entering it.
-pub const TRANSITIONS: [(State, Event, State); 49] = {
+pub const TRANSITIONS: [(State, Event, State); 52] = {
     use Event::{
         Arrived, AtRest, BrakeClosed, BrakeOpen, Disable, EmergencyStop, Enable, FaultBrake,
         FaultOff, FaultStop, PeerReady, Reset, SelfTestPassed, Start, Stop,
@@ -98,6 +98,8 @@ pub const TRANSITIONS: [(State, Event, State); 49] = {
         (PreOperational, EmergencyStop, EStop(Off)),
         (Ready, Enable, Enabling(0)),
         (Ready, FaultOff, PreOperational),
+        // Without torque the brake alone holds the lift.
+        (Ready, FaultBrake, Fault(Off)),
         (Ready, EmergencyStop, EStop(Off)),
         // The arm is at rest and the brake not open yet: there is nothing to stop.
         (Enabling(0), BrakeOpen, Enabled),
@@ -135,6 +137,8 @@ pub const TRANSITIONS: [(State, Event, State); 49] = {
         (Fault(Closing(0)), BrakeClosed, Fault(Off)),
         (Fault(Closing(0)), FaultOff, Fault(Off)),
         (Fault(Closing(0)), EmergencyStop, EStop(Closing(0))),
+        // Told, though nothing more can be done.
+        (Fault(Off), FaultBrake, Fault(Off)),
         (Fault(Off), EmergencyStop, EStop(Off)),
         (Fault(Off), Reset, PreOperational),
         (EStop(Stopping), AtRest, EStop(Closing(0))),
@@ -142,6 +146,7 @@ pub const TRANSITIONS: [(State, Event, State); 49] = {
         (EStop(Stopping), FaultOff, EStop(Off)),
         (EStop(Closing(0)), BrakeClosed, EStop(Off)),
         (EStop(Closing(0)), FaultOff, EStop(Off)),
+        (EStop(Off), FaultBrake, EStop(Off)),
         (EStop(Off), Reset, PreOperational),
     ]
 };

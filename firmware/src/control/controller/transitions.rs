@@ -13,8 +13,7 @@ use crate::mechanics::body::Body;
 impl Controller {
     /// Takes the transition of the current state on `event`; returns whether there is one.
     pub fn event(&mut self, event: Event) -> bool {
-        let brake = (self.setup.brake_delay / self.config.period.seconds()) as u32 + 1;
-        let Some(next) = self.state.after(event, brake) else {
+        let Some(next) = self.state.after(event, self.brake_samples()) else {
             return false;
         };
         if event == Event::SelfTestPassed {
@@ -55,6 +54,7 @@ impl Controller {
         match next {
             State::Enabling(_) => {
                 self.limp = false;
+                self.built_up = 0.0;
                 self.unlearn();
                 self.monitor.reset();
             }
@@ -160,6 +160,28 @@ impl Controller {
         } else {
             self.event(event);
         }
+    }
+
+    /// Watches the brake of an arm without torque, which it alone holds. One that does not close in its time, or has opened by itself, is told
+    /// once, and keeps the arm from being ready.
+    pub(super) fn watch_brake(&mut self, readings: &Readings) {
+        let status = readings.status;
+        if !status.contains(DriveStatus::BRAKE_RELEASED) {
+            self.unheld = 0;
+            return;
+        }
+        let before = self.unheld;
+        self.unheld = before.saturating_add(readings.steps);
+        let limit = self.brake_samples();
+        if self.unheld >= limit && (before < limit || self.state == State::Ready) {
+            let status = f32::from(status.bits());
+            self.fail(Fault::value(Cause::DriveFault, status, 0.0));
+        }
+    }
+
+    /// Time of the brake, samples.
+    fn brake_samples(&self) -> u32 {
+        (self.setup.brake_delay / self.config.period.seconds()) as u32 + 1
     }
 
     /// The control word for drives and pins now: unlike the last command sent, it includes what has happened since that
