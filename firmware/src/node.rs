@@ -56,6 +56,9 @@ pub struct Node {
     bad_feedback: u8,
     /// Frames since the newest feedback that are no message, saturating.
     strangers: u16,
+    /// So many of a flood that has ended, for some more feedbacks, or 0.
+    flood: u16,
+    flood_fades: u8,
     /// Sample number and arrival of the newest feedback.
     newest: Option<(u32, Instant)>,
     /// Number of samples answered.
@@ -92,6 +95,8 @@ impl Node {
             unsent: 0,
             bad_feedback: 0,
             strangers: 0,
+            flood: 0,
+            flood_fades: 0,
             newest: None,
             samples: 0,
             same_schema: None,
@@ -261,7 +266,7 @@ impl Node {
         };
         let steps = steps.saturating_add(self.controller.take_missed());
         self.newest = Some((feedback.sample, now));
-        if self.strangers >= FLOOD {
+        if self.strangers.max(self.flood) >= FLOOD {
             self.feel_flood(steps, feedback.status);
         }
         self.strangers = 0;

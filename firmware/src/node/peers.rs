@@ -12,6 +12,10 @@ use super::Node;
 use crate::control::fault::{FLOOD, FLOOD_RATE};
 use crate::control::states::State;
 
+/// Feedbacks after a flood in which it is remembered: those of the samples for which drives hold a command, and of the one in which they let go, may
+/// have waited for its end.
+const FLOOD_FADES: u8 = 8;
+
 /// The heartbeat of another node. As CiA 301 has it, it is watched from the first one on that was heard.
 #[derive(Clone, Debug)]
 pub(super) struct Pulse {
@@ -122,12 +126,19 @@ impl Node {
     }
 
     /// Judges frames that have come in place of a feedback, which is now there, `steps` samples after the last one. By themselves they change
-    /// nothing.
+    /// nothing. Feedback that had waited for their end comes first, and what has followed from them later.
     // Out of line: rare.
     #[inline(never)]
     pub(super) fn feel_flood(&mut self, steps: u32, status: DriveStatus) {
+        if self.strangers >= FLOOD {
+            (self.flood, self.flood_fades) = (self.strangers, FLOOD_FADES);
+        }
         if steps > 1 || self.has_let_go(status) {
             self.blame_flood(steps as f32 * self.controller.period());
+        }
+        self.flood_fades = self.flood_fades.saturating_sub(1);
+        if self.flood_fades == 0 {
+            self.flood = 0;
         }
     }
 
@@ -135,7 +146,7 @@ impl Node {
     fn blame_flood(&mut self, time: f32) {
         let limit = time * FLOOD_RATE;
         let limit = f32::from(FLOOD).max(limit);
-        let frames = f32::from(self.strangers);
+        let frames = f32::from(self.strangers.max(self.flood));
         if frames >= limit {
             self.controller
                 .fail(Fault::value(Cause::Babbling, frames, limit));

@@ -340,6 +340,25 @@ fn a_flooded_bus_is_named_where_it_is_felt() {
     }
 }
 
+/// Drives let go for want of commands after some samples, whose feedback waits for the end of the flood and says nothing of it.
+#[test]
+fn a_flood_is_named_after_feedback_that_has_waited_for_its_end() {
+    for (waited, expected) in [
+        (1, Cause::Babbling),
+        (7, Cause::Babbling),
+        (8, Cause::DriveFault),
+    ] {
+        let mut bench = Bench::enabled();
+        bench.babble(32);
+        bench.poll();
+        (0..waited).for_each(|_| drop(bench.step()));
+        assert_eq!(bench.mode(), Mode::Enabled);
+        bench.obeys = false;
+        bench.step();
+        assert_eq!(bench.node.controller().cause(), expected, "{waited}");
+    }
+}
+
 /// While the brake opens the drives may not be on yet; and in the 10 ms of a sample other devices may send as much.
 #[test]
 fn other_traffic_is_no_flood() {

@@ -191,7 +191,7 @@ fn micros(ms: f64) -> u64 {
 }
 
 /// Rows that no fault of a run reaches, and why.
-const OUT_OF_REACH: [(Cause, &str); 5] = [
+const OUT_OF_REACH: [(Cause, &str); 4] = [
     (
         Cause::SelfTest,
         "answers of the processor itself: `plant-sim crash`",
@@ -207,10 +207,6 @@ const OUT_OF_REACH: [(Cause, &str); 5] = [
     (
         Cause::Overload,
         "a motor heats up for longer than a case lasts: firmware/tests/heat.rs",
-    ),
-    (
-        Cause::Babbling,
-        "a feedback that was held up comes first, and drives that have let go are told: firmware/tests/node/peers.rs",
     ),
 ];
 

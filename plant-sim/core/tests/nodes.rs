@@ -95,6 +95,15 @@ fn a_babbling_node_stops_the_arm() {
         assert!(off.plant.t < 0.4 + 0.0085, "{node}: {}", off.plant.t);
         let (short, _) = gate(&format!("{node}:babbling@0.4s..0.402s"));
         assert!(short.completed, "{node}: {:?}", short.error);
+        // The feedback that has waited for the end of the flood is from before the drives let go.
+        let (summary, record) = gate(&format!("{node}:babbling@0.4s..0.42s"));
+        assert!(!summary.completed && summary.at_rest, "{node}");
+        let named = if node == "controller" {
+            Cause::DriveFault // It does not hear itself.
+        } else {
+            Cause::Babbling
+        };
+        assert_eq!(cause(&record), named, "{node}");
     }
 }
 
