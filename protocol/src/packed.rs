@@ -27,7 +27,6 @@ const COMMAND_LEN: usize = 21;
 const _: () = assert!(FEEDBACK_LEN == table::FEEDBACK.body_len());
 const _: () = assert!(COMMAND_LEN == table::COMMAND.body_len());
 
-const VELOCITY_MAX: f32 = magnitude(&table::FEEDBACK);
 const TORQUE_MAX: f32 = magnitude(&table::COMMAND);
 
 /// Greatest magnitude of the floats of a message with a single float signal, of symmetric range.
@@ -48,6 +47,11 @@ const fn magnitude(info: &MessageInfo) -> f32 {
 fn all_within(values: &[f32; 4], max: f32) -> bool {
     // Comparison with NaN is false.
     values.iter().all(|value| value.abs() <= max)
+}
+
+impl Feedback {
+    /// Greatest speed of a shaft that a feedback can carry, rad/s.
+    pub const MAX_VELOCITY: f32 = magnitude(&table::FEEDBACK);
 }
 
 impl Packed<FEEDBACK_LEN> for Feedback {
@@ -74,7 +78,7 @@ impl Packed<FEEDBACK_LEN> for Feedback {
     }
 
     fn in_range(&self) -> bool {
-        all_within(&self.velocity, VELOCITY_MAX)
+        all_within(&self.velocity, Self::MAX_VELOCITY)
     }
 }
 

@@ -14,9 +14,9 @@ const SLOW: f32 = 0.01;
 const BACK: f32 = 0.75;
 
 /// Square of the share of its speed that an arm may be off by where the drives have missed a sample, as it speeds up meanwhile; and the most
-/// times as far as in one sample that it may have gone: after more, they have switched off.
+/// times as far as in one sample that it may have gone: those that have missed more commands than they hold one for have switched off.
 const ALIKE: f32 = 0.0225;
-const MOST_TIMES: u32 = 8;
+const MOST_TIMES: u32 = 6;
 
 /// What is felt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -300,7 +300,8 @@ impl Monitor {
         let times = (found.dot(&last) / square + 0.5) as u32;
         let off = found - last * times as f32;
         let is_alike = square > SLOW * SLOW && off.dot(&off) < ALIKE * found.dot(&found);
-        if readings.steps == 1 && is_alike && (2..=MOST_TIMES).contains(&times) {
+        let has_counted_one = readings.steps == 1 && readings.is_measured();
+        if has_counted_one && is_alike && (2..=MOST_TIMES).contains(&times) {
             times - 1
         } else {
             0

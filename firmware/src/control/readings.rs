@@ -1,7 +1,7 @@
 //! What the drives report.
 
 use nalgebra::Vector4;
-use protocol::messages::DriveStatus;
+use protocol::messages::{DriveStatus, Feedback};
 
 use crate::mechanics::arm::Axis;
 
@@ -35,6 +35,11 @@ impl Readings {
     /// The same of these readings and of those with the velocity `before`, rad/s. An axis that turns back stands for an instant only.
     pub fn stays_still(&self, axis: Axis, before: f32) -> bool {
         self.is_still(axis) && is_still(before)
+    }
+
+    /// Whether the velocities are what the encoders show, and not the greatest that can be said.
+    pub fn is_measured(&self) -> bool {
+        self.velocity.abs().max() < Feedback::MAX_VELOCITY
     }
 
     /// Whether the motor of an axis moves against its torque and faster than at `before`, rad/s.

@@ -29,9 +29,6 @@ use settings::Settings;
 /// Default number of samples for which the last command is held without a new one.
 pub const HOLD_SAMPLES: u32 = DriveParameter::HoldSamples.initial(1.0) as u32;
 
-/// Greatest velocity that Feedback can carry, rad/s; the range in the message table.
-const VELOCITY_RANGE: f32 = 2000.0;
-
 /// The drives.
 #[derive(Clone, Debug)]
 pub struct Drives {
@@ -104,7 +101,7 @@ impl Drives {
             let counts = reading.counts[axis].wrapping_sub(before[axis]);
             // What a broken encoder makes of it, no motor reaches: a drive reports its greatest value.
             velocity[axis] = ((f64::from(counts) * radians_per_count / period) as f32)
-                .clamp(-VELOCITY_RANGE, VELOCITY_RANGE);
+                .clamp(-Feedback::MAX_VELOCITY, Feedback::MAX_VELOCITY);
             let per_mille =
                 reading.motor_torque[axis] / self.train.motor_torque_rated[axis] * 1000.0;
             // `as` saturates, for the same reason.
