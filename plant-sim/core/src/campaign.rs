@@ -22,6 +22,7 @@ pub mod expect;
 pub mod judge;
 mod lift;
 mod newest;
+mod reports;
 mod request;
 pub mod spells;
 pub mod tally;

@@ -13,6 +13,12 @@ use crate::plant::defect::{BrakeDefect, EncoderDefect, LoadDefect, MotorDefect};
 
 /// No feedback comes. The drives have let go by the time at which they are heard again, but the gap is what is felt first.
 const GAP: &[Cause] = &[Cause::FeedbackLost, Cause::PeerSilent];
+/// Nor anything of the operator.
+const HEARS_NOTHING: &[Cause] = &[
+    Cause::FeedbackLost,
+    Cause::PeerSilent,
+    Cause::OperatorSilent,
+];
 /// No command arrives. Feedback goes on, and says that the drives have let go.
 const LET_GO: &[Cause] = &[Cause::DriveFault];
 /// Feedback is held up, its sender does not miss it: what is told depends on which frame comes first.
@@ -82,21 +88,13 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
         },
         What::Silent(Node::Operator) => &[Cause::OperatorSilent],
         What::Silent(Node::Drives) => GAP,
-        // It hears nothing of either.
-        What::Silent(Node::Controller) => &[
-            Cause::FeedbackLost,
-            Cause::PeerSilent,
-            Cause::OperatorSilent,
-        ],
+        What::Silent(Node::Controller) | What::Misreads(Node::Controller, _) => HEARS_NOTHING,
         // Drives that start anew begin with sample 0, and without torque.
         What::Dead(Node::Drives) => &[Cause::DriveFault, Cause::FeedbackLost, Cause::PeerSilent],
         What::Dead(_) => &[],
-        What::Babbling(_) => &[
-            Cause::Babbling,
-            Cause::FeedbackLost,
-            Cause::PeerSilent,
-            Cause::DriveFault,
-        ],
+        // No node hears itself.
+        What::Babbling(Node::Controller) => HELD_UP,
+        What::Babbling(_) => &[Cause::Babbling],
         What::Wires(_) => OFF_THE_BUS,
         What::Attempts(info, kind, share) => match (info.content, kind) {
             (Content::Command, ErrorKind::Ack) => LET_GO,
@@ -109,16 +107,19 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
             _ => return None,
         },
         What::Misreads(Node::Drives, _) => &[Cause::BusOff, Cause::DriveFault],
-        What::Misreads(Node::Controller, _) => GAP,
         // After some ten error flags it is passive, and spoils nothing.
         What::Misreads(Node::Operator, _) => &[],
         What::NoRecovery(_) => &[],
         What::Clock(ClockDefect::Drift(_)) => &[],
         What::Clock(ClockDefect::Misses(share)) if share >= 1.0 => HELD_UP,
         // A few can be told from the readings, many near each other cannot.
-        What::Clock(ClockDefect::Misses(_)) => {
-            &[Cause::FeedbackLost, Cause::Collision, Cause::EncoderFault]
-        }
+        What::Clock(ClockDefect::Misses(_)) => &[
+            Cause::FeedbackLost,
+            Cause::Collision,
+            Cause::EncoderFault,
+            Cause::Chatter,
+            Cause::OverSpeed,
+        ],
         // Further than any axis gets in a sample.
         What::Encoder(axis, EncoderDefect::Jump(by)) if by.abs() > 2.0 * FOLLOWING_ERROR[axis] => {
             &[Cause::EncoderFault]
@@ -167,6 +168,8 @@ pub(super) fn may_be_untold(what: What) -> bool {
     match what {
         What::Silent(Node::Operator)
         | What::Misreads(Node::Operator, _)
+        // Passive, it does not ask for frames to be repeated that it could not read. Of its requests, the operator misses the reply.
+        | What::Misreads(Node::Controller, _)
         | What::Babbling(_)
         | What::Wires(_)
         | What::NoRecovery(Node::Controller)

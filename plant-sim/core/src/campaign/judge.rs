@@ -9,9 +9,10 @@ use protocol::time::{Duration, Instant, Period};
 use protocol::{codec, table};
 
 use super::bounds::{Bounds, STANDING};
-use super::expect::{Expected, stops_under_control};
+use super::expect::Expected;
 use super::lift::Lift;
 use super::newest::Newest;
+use super::reports::{Reports, is_at_rest};
 use super::request::Request;
 use super::spells::Spells;
 use super::verdict::{Requirement, Verdict, round};
@@ -40,9 +41,6 @@ pub struct Judge {
     bounds: Bounds,
     faults: Spells,
     payload: Option<Payload>,
-    /// Beginning of the first fault; the end of time without one.
-    onset: Instant,
-    expected: Expected,
     /// Whether the brake may stay open, where torque has to go on holding the lift.
     torque_holds: bool,
     /// Longest time from a report to the last command that does not know of it.
@@ -50,11 +48,9 @@ pub struct Judge {
     missed: BTreeSet<Requirement>,
     newest: Newest,
     request: Request,
-    report: Option<(Instant, Cause)>,
-    /// Whether more was reported while the arm stopped, which closes the brake at once.
-    escalated: bool,
-    /// When the drives switched off by themselves.
-    cut: Option<f64>,
+    reports: Reports,
+    /// When the drives switched off by themselves, and in which mode of the controller.
+    cut: Option<(f64, Mode)>,
     /// The arm when the fault was detected.
     detected: Option<Mark>,
     /// The arm when torque went off, since when it has stayed off.
@@ -76,6 +72,8 @@ pub struct Judge {
     ends: Ending,
     mode: Mode,
     survived: bool,
+    /// Whether it completed, and the drives let go while it was being switched off.
+    ended_switching_off: bool,
 }
 
 impl Judge {
@@ -87,8 +85,6 @@ impl Judge {
         let mut judge = Self {
             period,
             bounds: Bounds::new(&config.actual, period.duration().seconds()),
-            onset: Instant::MAX,
-            expected: Expected::Survived,
             torque_holds: faults.leave_the_brake_open(),
             reaction: period.duration() + faults.lateness(),
             payload: None,
@@ -96,8 +92,7 @@ impl Judge {
             newest: Newest::new(period, !faults.lose_count()),
             faults,
             request: Request::default(),
-            report: None,
-            escalated: false,
+            reports: Reports::default(),
             cut: None,
             detected: None,
             off: None,
@@ -113,16 +108,10 @@ impl Judge {
             ends: scenario.ends,
             mode: Mode::Boot,
             survived: false,
+            ended_switching_off: false,
         };
-        judge.look_forward();
         judge.weigh();
         judge
-    }
-
-    /// What to expect, as far as the times of the faults are known.
-    fn look_forward(&mut self) {
-        self.onset = self.onset.min(self.faults.onset());
-        self.expected = self.faults.expected();
     }
 
     /// What is at the flange is known, or may become so.
@@ -140,41 +129,49 @@ impl Judge {
 
     /// The scenario has ended, completed or not, and the arm has come to rest. What follows is to be still.
     pub fn ended(&mut self, completed: bool) {
-        let told = self.report.map(|(_, cause)| cause);
+        let told = self.reports.told();
         self.survived = match self.ends {
             Ending::Completed => completed && self.first().is_none(),
             // Without a fault only the operator's emergency stop ends it like that.
             Ending::Stopped => told == Some(Cause::EStop),
         };
+        // Drives that let go in time for that need not be told.
+        let is_off = matches!(self.cut, Some((_, Mode::Disabling)));
+        self.ended_switching_off = completed && is_off;
         self.rest = self.last;
         // Without feedback it may still be waiting for the brake.
-        let is_latched = matches!(self.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop);
-        if self.report.is_some() && !is_latched {
+        let has_latched = matches!(self.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop);
+        if self.reports.latched().is_some() && !has_latched {
             self.miss(Requirement::Latch);
         }
-        let is_early = self.first().is_some_and(|at| at < self.onset.seconds());
-        if (is_early && !self.survived) || !self.expected.allows(self.survived, told) {
+        let is_early = self
+            .first()
+            .is_some_and(|at| at < self.faults.onset().seconds());
+        if (is_early && !self.survived) || !self.faults.expected().allows(self.survived, told) {
             self.miss(Requirement::NoFalseAlarm);
         }
     }
 
     /// The request to switch on that a latched fault has to refuse; `None` without one.
     pub fn temptation(&self) -> Option<CanFrame> {
-        self.report?;
+        self.reports.latched()?;
         self.request.enable()
     }
 
     /// The verdict.
     pub fn finish(mut self) -> Verdict {
-        let onset = self.onset.seconds();
-        let told = self.report.map(|(_, cause)| cause);
-        let has_begun = self.onset < Instant::MAX;
+        let onset = self.faults.onset().seconds();
+        let told = self.reports.told();
+        let has_begun = self.faults.onset() < Instant::MAX;
         let since = |time: f64| has_begun.then(|| round((time - onset) * 1e3));
         self.judge_fall();
-        self.missed
-            .extend(self.faults.judge_told(told, self.survived));
+        let is_latched = self.reports.latched().is_some();
+        let is_well = self.survived || self.ended_switching_off;
+        let wrong = self.faults.judge_told(told, is_latched, is_well);
+        self.missed.extend(wrong);
         let end = self.last.map_or(0.0, |last| last.t);
-        if self.report.is_some() && !self.torque_holds && self.newest.enables_torque(end) {
+        if self.reports.latched().is_some() && !self.torque_holds && self.newest.enables_torque(end)
+        {
             self.miss(Requirement::Standstill);
         }
         let stopped = self.detected.is_some();
@@ -200,8 +197,14 @@ impl Judge {
 
     /// When something was detected, s.
     fn first(&self) -> Option<f64> {
-        let reported = self.report.map(|(time, _)| time.seconds());
-        [reported, self.cut].into_iter().flatten().reduce(f64::min)
+        let all = [self.reports.first(), self.cut.map(|(at, _)| at)];
+        all.into_iter().flatten().reduce(f64::min)
+    }
+
+    /// Whether torque is commanded, by a controller that has not switched it off since: that command may be lost.
+    fn is_powered(&self) -> bool {
+        let is_off = is_at_rest(self.mode) || self.mode == Mode::Fault;
+        self.newest.control.contains(ControlWord::TORQUE_ENABLE) && !is_off
     }
 
     /// The controller has commanded the drives.
@@ -216,14 +219,14 @@ impl Judge {
         let normal = control.contains(ControlWord::TORQUE_ENABLE)
             && control.contains(ControlWord::BRAKE_RELEASE)
             && !control.contains(ControlWord::QUICK_STOP);
-        if let Some((reported, _)) = self.report
+        if let Some(reported) = self.reports.latched()
             && normal
             && time.since(reported) > self.reaction
         {
             self.miss(Requirement::Reaction);
         }
         // A fault that has switched torque off keeps it off.
-        if self.report.is_some()
+        if self.reports.latched().is_some()
             && control.contains(ControlWord::TORQUE_ENABLE)
             && !before.contains(ControlWord::TORQUE_ENABLE)
         {
@@ -268,7 +271,7 @@ impl Judge {
     fn judge_stop(&mut self, detected: Mark, now: Mark, is_driven: bool, on_stop: bool) {
         if is_driven {
             let was_off = self.off.take().is_some();
-            if self.report.is_none() {
+            if self.reports.latched().is_none() {
                 // The drives had switched off, and nobody is told that they are on again.
                 if was_off {
                     self.miss(Requirement::Latch);
@@ -299,16 +302,14 @@ impl Judge {
     }
 
     fn judge_fall(&mut self) {
-        // An arm that went on moved as it was meant to.
-        let went_on = self.report.is_none() && self.missed.contains(&Requirement::Latch);
-        let allowed = self.bounds.drop(self.lift.speed()) + self.lift.pull();
-        if !went_on && self.lift.drop() > allowed {
-            self.miss(Requirement::Drop);
+        let is_latched = self.reports.latched().is_some();
+        // An arm that went on moved as it was meant to, and one without torque has only its brake.
+        let went_on = self.missed.contains(&Requirement::Latch);
+        if !is_latched && (went_on || self.cut.is_none()) {
+            return;
         }
-        let told = self.report.map(|(_, cause)| cause);
-        let is_controlled =
-            self.cut.is_none() && !self.escalated && told.is_some_and(stops_under_control);
-        if is_controlled && self.lift.sunk() > STANDING {
+        let is_controlled = self.cut.is_none() && self.reports.ask_for_control();
+        if self.lift.is_too_low(&self.bounds, is_controlled) {
             self.miss(Requirement::Drop);
         }
     }
@@ -328,8 +329,7 @@ impl Observer for Judge {
             Message::Emergency(Node::Controller, Emergency { cause, .. })
                 if cause != Cause::None =>
             {
-                self.escalated |= self.report.is_some();
-                self.report.get_or_insert((time, cause));
+                self.reports.take(time, cause, self.mode);
             }
             Message::Feedback(feedback) => {
                 let open = self.newest.brake_open(time, feedback.status);
@@ -350,11 +350,11 @@ impl Observer for Judge {
 
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         let plant = &truth.plant;
-        let is_powered = self.newest.control.contains(ControlWord::TORQUE_ENABLE);
         self.mode = truth.mind.mode;
+        let is_powered = self.is_powered();
         if is_powered && plant.tau == [0.0; 4] && self.last.is_some_and(|last| last.tau != [0.0; 4])
         {
-            self.cut.get_or_insert(plant.t);
+            self.cut.get_or_insert((plant.t, self.mode));
         }
         if is_powered
             && self.first().is_none()
@@ -364,7 +364,7 @@ impl Observer for Judge {
             self.miss(Requirement::Reported);
         }
         let now = Instant::ORIGIN + Duration::from_seconds(plant.t);
-        if let Expected::DetectedBy(due) = self.expected
+        if let Expected::DetectedBy(due) = self.faults.expected()
             && self.rest.is_none()
             && now >= due
             && is_powered
@@ -373,7 +373,7 @@ impl Observer for Judge {
             self.miss(Requirement::Detected);
         }
         self.lift.catch(plant, now >= self.faults.caught_from());
-        if now >= self.onset && self.rest.is_none() {
+        if now >= self.faults.onset() && self.rest.is_none() {
             self.measure(plant, truth.mind.q[2]);
         }
         if let Some(rest) = &self.rest {
@@ -395,6 +395,5 @@ impl Observer for Judge {
 
     fn fault(&mut self, number: usize, from: Instant, until: Instant) {
         self.faults.retime(number, from, until);
-        self.look_forward();
     }
 }

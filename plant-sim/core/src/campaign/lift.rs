@@ -1,5 +1,6 @@
 //! How far the lift goes down that it should not.
 
+use super::bounds::{Bounds, STANDING};
 use crate::observer::PlantState;
 
 const LIFT: usize = 2;
@@ -62,7 +63,7 @@ impl Lift {
     }
 
     /// How far a spring may pull it down, m: from above to where it caught the tool, and as far beyond.
-    pub(super) fn pull(&self) -> f64 {
+    fn pull(&self) -> f64 {
         let (Some(since), Some(caught)) = (self.since, self.caught) else {
             return 0.0;
         };
@@ -75,13 +76,19 @@ impl Lift {
     }
 
     /// How far it went down since torque was off, m.
-    pub(super) fn sunk(&self) -> f64 {
+    fn sunk(&self) -> f64 {
         self.since.map_or(0.0, |since| since.sunk)
     }
 
     /// Greatest speed downwards at the detection and under torque, m/s.
-    pub(super) fn speed(&self) -> f64 {
+    fn speed(&self) -> f64 {
         self.since.map_or(0.0, |since| since.speed)
+    }
+
+    /// Whether it went down further than these bounds have it; after a stop under control its closed brake holds it where it is.
+    pub(super) fn is_too_low(&self, bounds: &Bounds, is_controlled: bool) -> bool {
+        let allowed = bounds.drop(self.speed()) + self.pull();
+        self.drop() > allowed || (is_controlled && self.sunk() > STANDING)
     }
 }
 

@@ -26,6 +26,9 @@ pub struct Spell {
 pub(super) struct Spells {
     all: Vec<Spell>,
     period: Period,
+    /// Beginning of the first; the end of time without one.
+    onset: Instant,
+    expected: Expected,
 }
 
 impl Spells {
@@ -36,10 +39,21 @@ impl Spells {
             let what = fault.what;
             Spell { what, from, until }
         };
-        Self {
+        let mut spells = Self {
             all: faults.iter().map(spell).collect(),
             period,
-        }
+            onset: Instant::MAX,
+            expected: Expected::Survived,
+        };
+        spells.look_forward();
+        spells
+    }
+
+    /// What follows from them, as far as their times are known.
+    fn look_forward(&mut self) {
+        let begins = self.all.iter().map(|spell| spell.from);
+        self.onset = begins.min().unwrap_or(Instant::MAX).min(self.onset);
+        self.expected = expected(&self.all, self.period);
     }
 
     /// The time of one is known, or changes.
@@ -47,17 +61,17 @@ impl Spells {
         if let Some(spell) = self.all.get_mut(number) {
             (spell.from, spell.until) = (from, until);
         }
+        self.look_forward();
     }
 
-    /// Beginning of the first.
+    /// Beginning of the first; the end of time without one.
     pub(super) fn onset(&self) -> Instant {
-        let begins = self.all.iter().map(|spell| spell.from);
-        begins.min().unwrap_or(Instant::MAX)
+        self.onset
     }
 
     /// What has to follow.
     pub(super) fn expected(&self) -> Expected {
-        expected(&self.all, self.period)
+        self.expected
     }
 
     /// How late a command may be for them.
@@ -65,8 +79,14 @@ impl Spells {
         lateness(&self.all, self.period)
     }
 
-    /// What is wrong with what the controller has told in the end: the first cause, or none.
-    pub(super) fn judge_told(&self, told: Option<Cause>, survived: bool) -> Option<Requirement> {
+    /// What is wrong with what the controller has told in the end: the first cause, or none. An arm without torque has nothing to latch, and
+    /// what is wrong with the link is told as drives that are not heard.
+    pub(super) fn judge_told(
+        &self,
+        told: Option<Cause>,
+        is_latched: bool,
+        survived: bool,
+    ) -> Option<Requirement> {
         let Some(cause) = told else {
             let is_silent = !survived && !self.any(causes::may_be_untold);
             return is_silent.then_some(Requirement::Detected);
@@ -75,6 +95,7 @@ impl Spells {
         let mut causes = begun.map(|spell| causes::of(spell.what));
         // An emergency stop is the operator's.
         let may_be = cause == Cause::EStop
+            || (cause == Cause::PeerSilent && !is_latched)
             || causes.any(|causes| causes.is_none_or(|causes| causes.contains(&cause)));
         (!may_be).then_some(Requirement::Cause)
     }
