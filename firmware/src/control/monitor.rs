@@ -16,7 +16,7 @@ const BACK: f32 = 0.75;
 /// Square of the share of its speed that an arm may be off by where the drives have missed a sample, as it speeds up meanwhile; and the most
 /// times as far as in one sample that it may have gone: those that have missed more commands than they hold one for have switched off.
 const ALIKE: f32 = 0.0225;
-const MOST_TIMES: u32 = 6;
+const MOST_TIMES: u32 = 7;
 
 /// What is felt.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -202,7 +202,7 @@ fn a_missed_tick_of_the_clock_is_bridged() {
     let law = "computed-torque:observer";
     let told = first(
         scenario("palletise", 1000.0, law),
-        "clock:misses@0.4s..+6samples",
+        "clock:misses@0.4s..+5samples",
         0.4,
     );
     assert_eq!(told.unwrap().0, Cause::FeedbackLost.name());

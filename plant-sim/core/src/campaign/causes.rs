@@ -4,8 +4,10 @@
 
 use protocol::messages::{Cause, Node};
 use protocol::schema::Content;
+use protocol::time::Instant;
 
 use super::bounds::FOLLOWING_ERROR;
+use super::spells::Spell;
 use crate::bus::ErrorKind;
 use crate::clock::ClockDefect;
 use crate::faults::{Disguise, FrameFault, What};
@@ -164,17 +166,18 @@ fn of_frames(content: Content, kind: FrameFault) -> Option<&'static [Cause]> {
 }
 
 /// Whether such a fault may end a run without a word of the controller: nobody is there to command the arm, or to be told.
-pub(super) fn may_be_untold(what: What) -> bool {
-    match what {
+pub(super) fn may_be_untold(spell: &Spell) -> bool {
+    let stays = spell.until == Instant::MAX;
+    match spell.what {
         What::Silent(Node::Operator)
         | What::Misreads(Node::Operator, _)
         // Passive, it does not ask for frames to be repeated that it could not read. Of its requests, the operator misses the reply.
         | What::Misreads(Node::Controller, _)
-        | What::Babbling(_)
-        | What::Wires(_)
         | What::NoRecovery(Node::Controller)
         | What::Silent(Node::Controller)
         | What::Dead(Node::Controller) => true,
+        // A word gets through once the bus is free.
+        What::Babbling(_) | What::Wires(_) => stays,
         What::Frames(info, _) | What::Foreign(info, _) | What::Attempts(info, ..) => !matches!(
             info.content,
             Content::Feedback | Content::Command | Content::Heartbeat(_)

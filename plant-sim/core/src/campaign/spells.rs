@@ -88,7 +88,7 @@ impl Spells {
         survived: bool,
     ) -> Option<Requirement> {
         let Some(cause) = told else {
-            let is_silent = !survived && !self.any(causes::may_be_untold);
+            let is_silent = !survived && !self.all.iter().any(causes::may_be_untold);
             return is_silent.then_some(Requirement::Detected);
         };
         let begun = self.all.iter().filter(|spell| spell.from < Instant::MAX);
