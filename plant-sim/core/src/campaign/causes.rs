@@ -113,10 +113,11 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
         What::Misreads(Node::Operator, _) => &[],
         What::NoRecovery(_) => &[],
         What::Clock(ClockDefect::Drift(_)) => &[],
-        What::Clock(ClockDefect::Misses(share)) if share >= 1.0 => HELD_UP,
         // A few can be told from the readings, many near each other cannot.
         What::Clock(ClockDefect::Misses(_)) => &[
             Cause::FeedbackLost,
+            Cause::PeerSilent,
+            Cause::DriveFault,
             Cause::Collision,
             Cause::EncoderFault,
             Cause::Chatter,

@@ -11,7 +11,8 @@
 //! | 4 old feedback frames in a row | 5 samples | the third repeated or old frame |
 //! | an encoder that jumps further than the following error allows | 4 samples | three samples beyond a limit, and one to answer |
 //! | every attempt to send feedback fails for up to 2 samples; what the controller receives is unreadable for as long; a node babbles | the same as without it | frames wait and are repeated: even after 32 attempts (bus-off of the drives) and 1.4 ms of recovery the next feedback is there within 5 samples |
-//! | every attempt to send commands fails for up to 2 samples; what the drives receive is unreadable; the wires are held | the same, or the arm stops for a bus-off | as before, unless 32 attempts have failed |
+//! | every attempt to send commands fails for up to 2 samples; what the drives receive is unreadable | the same, or the arm stops for a bus-off | as before, unless 32 attempts have failed |
+//! | the wires are held for up to 2 samples | the same, or the arm stops | two nodes may be off the bus, and what the third sends without acknowledgement delays their return |
 //! | any of these but babbling for 9 samples or more | 8 samples | nothing gets through: the drives switch off as if it were lost |
 //! | nobody acknowledges feedback for 9 samples or more | 8 samples | after 16 attempts the drives are passive, and the same frame comes again and again: three repeated frames |
 //! | nobody acknowledges commands for 9 samples or more | 9 samples | one more command gets through once the controller is passive; it is repeated, and keeps all later ones waiting |
@@ -128,7 +129,7 @@ fn of(fault: &Spell, period: Period) -> Expected {
         What::Silent(Node::Drives) => by_length(2, 9, 8),
         What::Silent(Node::Controller) | What::Dead(_) => no_survival(by_length(0, 9, 8)),
         What::Babbling(_) => by_length(2, 9, 8),
-        What::Wires(_) => or_bus_off(by_length(2, 9, 8)),
+        What::Wires(_) => no_survival(by_length(2, 9, 8)),
         What::Motor(_, MotorDefect::Runaway) if lasts >= RUNAWAY => {
             Expected::DetectedBy(fault.from + RUNAWAY)
         }
