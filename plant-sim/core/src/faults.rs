@@ -117,6 +117,8 @@ pub enum FrameFault {
     Duplicate,
     /// One bit of it is wrong, with this probability: a fault inside the node, which the CRC of the bus covers up.
     Corrupt(f64),
+    /// Its first real number is none, under a right CRC, with this probability.
+    BadValue(f64),
     /// The frame of the same message that was sent this many frames earlier takes its place.
     Replay(usize),
 }

@@ -16,13 +16,13 @@ mod record;
 use std::collections::BTreeMap;
 
 use gate::{cause, gate};
-use protocol::codec::{self, Encoder};
+use protocol::codec::{self, DecodeError, Encoder};
 use protocol::frame::CanFrame;
 use protocol::messages::{Cause, Command, ControlWord, Message, Mode, Node};
 use protocol::table;
 use protocol::time::{Duration, Instant};
 use record::Record;
-use sim::faults::Faulty;
+use sim::faults::{Fault, Faulty};
 use sim::peer::{Outbox, Peer, PeerError};
 use sim::rig::Rig;
 use sim::scenario::Scenario;
@@ -338,4 +338,30 @@ fn a_dip_of_a_drive_is_reported_by_it() {
         assert_eq!(cause(&record), Cause::DriveFault, "{axis}");
         assert!(!summary.completed && summary.at_rest, "{axis}");
     }
+}
+
+/// All that is protected is right: only the range of the number is not.
+#[test]
+fn a_bad_value_is_the_only_thing_that_is_wrong() {
+    let (summary, record) = gate("feedback:bad-value@0.4s..0.402s");
+    assert!(summary.completed, "two can be noise: {:?}", summary.error);
+    let bad: Vec<_> = record
+        .frames
+        .iter()
+        .filter(|(_, frame)| codec::decode(frame).is_err())
+        .collect();
+    assert_eq!(bad.len(), 2);
+    for (_, frame) in bad {
+        assert!(table::FEEDBACK.identifies(frame));
+        let error = codec::decode(frame).unwrap_err();
+        assert!(matches!(error, DecodeError::Value(_)), "{error:?}");
+    }
+    let refused = "motion:bad-value@0s"
+        .parse::<Fault>()
+        .unwrap_err()
+        .to_string();
+    assert!(
+        refused.contains("allowed: Feedback, Command, State"),
+        "{refused}"
+    );
 }

@@ -55,9 +55,10 @@ fn modes(record: &Record) -> Vec<Mode> {
 }
 
 /// In motion at 0.4 s.
-const CASES: [(&str, Cause); 10] = [
+const CASES: [(&str, Cause); 11] = [
     ("feedback:loss@0.4s", Cause::PeerSilent),
     ("feedback:corrupt@0.4s", Cause::Corrupted),
+    ("feedback:bad-value@0.4s", Cause::BadValue),
     ("drives:silent@0.4s", Cause::PeerSilent),
     ("encoder:elbow:stuck@0.4s", Cause::StuckSensor),
     ("encoder:shoulder:jump=0.5@0.4s", Cause::EncoderFault),

@@ -151,6 +151,7 @@ fn of_frames(content: Content, kind: FrameFault) -> Option<&'static [Cause]> {
         (_, FrameFault::Duplicate) => &[],
         (Content::Feedback, FrameFault::Loss(_) | FrameFault::Burst(..)) => GAP,
         (Content::Feedback, FrameFault::Corrupt(_)) => &[Cause::Corrupted],
+        (Content::Feedback, FrameFault::BadValue(_)) => &[Cause::BadValue],
         (Content::Feedback, FrameFault::Replay(_) | FrameFault::Reorder(_)) => OLD,
         (Content::Feedback, FrameFault::Delay(_)) => HELD_UP,
         (Content::Feedback, FrameFault::Jitter(_)) => &[

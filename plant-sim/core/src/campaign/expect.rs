@@ -139,7 +139,9 @@ fn of(fault: &Spell, period: Period) -> Expected {
         What::Frames(info, kind) => match (info.content, kind) {
             (_, FrameFault::Duplicate) => Expected::Survived,
             (Content::Feedback, FrameFault::Loss(1.0)) => by_length(2, 9, 8),
-            (Content::Feedback, FrameFault::Corrupt(1.0)) => by_length(2, 4, 4),
+            (Content::Feedback, FrameFault::Corrupt(1.0) | FrameFault::BadValue(1.0)) => {
+                by_length(2, 4, 4)
+            }
             (Content::Feedback, FrameFault::Replay(back)) if back >= 4 => {
                 no_survival(by_length(0, 5, 5))
             }
@@ -147,9 +149,10 @@ fn of(fault: &Spell, period: Period) -> Expected {
                 Content::Heartbeat(Node::Drives | Node::Operator),
                 FrameFault::Loss(1.0) | FrameFault::Corrupt(1.0),
             ) => of_heart(),
-            (Content::Command, FrameFault::Loss(1.0) | FrameFault::Corrupt(1.0)) => {
-                by_length(3, 9, 8)
-            }
+            (
+                Content::Command,
+                FrameFault::Loss(1.0) | FrameFault::Corrupt(1.0) | FrameFault::BadValue(1.0),
+            ) => by_length(3, 9, 8),
             (Content::Feedback | Content::Command, FrameFault::Delay(late))
                 if Duration::from_seconds(late) >= samples(9) =>
             {

@@ -6,6 +6,7 @@ use oorandom::Rand64;
 use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{Message, Nmt, Node};
+use protocol::schema::{Kind, MessageInfo, Signal};
 use protocol::time::{Duration, Instant};
 
 use super::impostor::like;
@@ -166,6 +167,13 @@ impl<P: Peer> Faulty<P> {
                         }
                     }
                 }
+                FrameFault::BadValue(share) => {
+                    if self.random.rand_float() < share {
+                        for (_, frame) in &mut out[first..] {
+                            spoil(frame, info);
+                        }
+                    }
+                }
                 FrameFault::Replay(_) => {
                     if let Some(old) = old {
                         out.truncate(first);
@@ -192,6 +200,25 @@ fn flip(frame: &mut CanFrame, random: &mut Rand64) {
     let bit = random.rand_range(0..bits) as usize;
     let mut data = frame.data().to_vec();
     data[bit / 8] ^= 1 << (bit % 8);
+    *frame = like(frame, &data);
+}
+
+/// A real number that the message always carries.
+pub(super) fn real_number(info: &MessageInfo) -> Option<&Signal> {
+    let mut signals = info.signals.iter();
+    signals.find(|signal| signal.when.is_none() && matches!(signal.kind, Kind::F32 { .. }))
+}
+
+/// Puts what is no number in its place.
+fn spoil(frame: &mut CanFrame, info: &MessageInfo) {
+    let (Ok(received), Some(signal)) = (codec::decode(frame), real_number(info)) else {
+        return;
+    };
+    let mut data = frame.data().to_vec();
+    data[signal.offset..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    if let Some(profile) = info.protection {
+        profile.protect(info.id, received.counter.unwrap_or(0), &mut data);
+    }
     *frame = like(frame, &data);
 }
 

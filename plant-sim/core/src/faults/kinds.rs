@@ -116,7 +116,7 @@ const fn of_axis(
 
 /// Every kind, in the order of the documents.
 #[rustfmt::skip]
-pub const KINDS: [Kind; 41] = [
+pub const KINDS: [Kind; 42] = [
     of_message("loss", Some(SHARE), "the frame never gets to the bus"),
     Kind {
         second: Some(Value { default: Some(8.0), ..value(1.0, 1000.0, "frames in a burst, on average") }),
@@ -127,6 +127,7 @@ pub const KINDS: [Kind; 41] = [
     of_message("jitter", Some(SECONDS), "the frame is late by a random time up to this"),
     of_message("duplicate", None, "the frame is sent twice"),
     of_message("corrupt", Some(SHARE), "one bit is wrong inside the node, so that the CRC of the bus is right"),
+    of_message("bad-value", Some(SHARE), "its first real number is none (NaN): the arithmetic of the node is wrong, and every CRC right"),
     of_message("replay", Some(Value { default: Some(1.0), ..whole(1.0, 64.0, "frames") }),
         "the frame is the one sent so many frames before"),
     of_message("masquerade", None, "a foreign node sends the message once a sample, without its end-to-end protection"),
