@@ -22,6 +22,7 @@ macro_rules! listed {
     };
 }
 
+pub mod burden;
 pub mod chatter;
 pub mod controller;
 pub mod fault;

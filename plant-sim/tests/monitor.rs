@@ -59,6 +59,7 @@ fn state(mode: Mode, cause: Cause) -> CanFrame {
         fault_limit: 2.42,
         pace: 100,
         operation: Operation::Automatic,
+        burden: 0,
     };
     codec::encode(&Message::State(state), 0).unwrap()
 }

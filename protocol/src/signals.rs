@@ -185,6 +185,7 @@ pub(crate) const STATE: &[Signal] = &[
     signal("fault_limit", 37, ANY, one!("")),
     signal("pace", 41, Kind::U8, one!("%")),
     signal("operation", 42, OPERATION, one!("")),
+    signal("burden", 43, Kind::I16, one!("10 g")),
 ];
 
 /// Answer to a request.

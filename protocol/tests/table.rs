@@ -173,6 +173,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
             one("fault_limit", m.fault_limit),
             one("pace", m.pace),
             one("operation", m.operation.code()),
+            one("burden", m.burden),
         ],
         Message::MotionReply(m) => match m.outcome {
             Outcome::Accepted => vec![one("sequence", m.sequence), one("outcome", 0)],

@@ -24,6 +24,7 @@ use protocol::parameters::ControllerParameter as Parameter;
 use protocol::time::Period;
 use serde::{Deserialize, Serialize};
 
+use crate::control::burden::Burden;
 use crate::control::chatter::Chatter;
 use crate::control::heat::Heat;
 use crate::control::laws::observer::MomentumObserver;
@@ -131,6 +132,7 @@ pub struct Controller {
     observer: MomentumObserver,
     monitor: Monitor,
     heat: Heat,
+    burden: Burden,
     chatter: Chatter,
     excess: Vector4<f32>,
     error: Vector4<f32>,
@@ -181,6 +183,7 @@ impl Controller {
             observer: MomentumObserver::new(),
             monitor: Monitor::new(&config.arm, &config.setup.monitor, config.period.seconds()),
             heat: Heat::new(),
+            burden: Burden::new(),
             chatter: Chatter::new(),
             excess: Vector4::zeros(),
             error: Vector4::zeros(),

@@ -63,6 +63,7 @@ impl Node {
             fault_limit: fault.limit,
             pace: (controller.pace() * 100.0 + 0.5) as u8,
             operation: controller.operation(),
+            burden: (controller.burden() * 100.0) as i16,
         }
     }
 }

@@ -89,6 +89,8 @@ pub struct Summary {
     /// Least share of the planned speed at which the controller reported to move, of 1: less than 1 with a speed override, where
     /// the torque did not suffice, and with warm motors.
     pub pace: f64,
+    /// Mass that the controller reported the lift to carry beyond the announced payload, at the last move, kg.
+    pub burden_kg: f64,
     /// Longest time with the motor at its limit, by axis, according to the plant, s.
     pub longest_saturation_s: [f64; 4],
     /// Share of the time for which the bus was busy, of 1.
@@ -129,6 +131,8 @@ pub struct Collector {
     state: Option<State>,
     /// Least pace of a move, of 1.
     pace: f64,
+    /// Mass beyond the announced one while the arm moved last, kg.
+    burden: f64,
     target: Option<[f64; 4]>,
     timing: BitTiming,
     /// Whether a command has arrived since the last sample; `None` before the very first.
@@ -147,6 +151,7 @@ impl Collector {
             faults: Faults::default(),
             state: None,
             pace: 1.0,
+            burden: 0.0,
             target: config.cycle_target(),
             timing: BitTiming::default(),
             answered: None,
@@ -169,6 +174,7 @@ impl Collector {
             faults,
             state,
             pace,
+            burden,
             overruns,
             ..
         } = self;
@@ -216,6 +222,7 @@ impl Collector {
             heat: thermometer.finish(),
             speed_utilisation: metrics.speed_utilisation(),
             pace,
+            burden_kg: burden,
             longest_saturation_s: metrics
                 .longest_saturation
                 .map(|samples| samples as f64 / scenario.rate_hz),
@@ -261,6 +268,7 @@ impl Observer for Collector {
                 self.thermometer.state(time, &state);
                 if state.mode == Mode::Moving {
                     self.pace = self.pace.min(f64::from(state.pace) / 100.0);
+                    self.burden = f64::from(state.burden) / 100.0;
                 }
                 if self.faults.state(time, &state) {
                     self.judge.fault(time);

@@ -108,6 +108,9 @@ pub struct State {
     pub pace: u8,
     /// How the arm is operated.
     pub operation: Operation,
+    /// Mass that the lift feels beyond the announced payload, by its weight, 10 g.
+    #[serde(with = "postcard::fixint::le")]
+    pub burden: i16,
 }
 
 impl State {

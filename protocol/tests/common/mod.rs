@@ -145,7 +145,13 @@ fn state() -> impl Strategy<Value = Message> {
             select(Operation::ALL),
         ),
         uniform4(any_f32()),
-        (select(FaultAxis::ALL), any_f32(), any_f32(), any::<u8>()),
+        (
+            select(FaultAxis::ALL),
+            any_f32(),
+            any_f32(),
+            any::<u8>(),
+            any::<i16>(),
+        ),
     )
         .prop_map(|(status, counts, selected, tracking_error, fault)| {
             Message::State(State {
@@ -165,6 +171,7 @@ fn state() -> impl Strategy<Value = Message> {
                 fault_limit: fault.2,
                 pace: fault.3,
                 operation: selected.2,
+                burden: fault.4,
             })
         })
 }

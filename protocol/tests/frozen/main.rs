@@ -123,6 +123,7 @@ fn state() {
             fault_limit: 0.0,
             pace: 0,
             operation: Operation::Automatic,
+            burden: 0,
         }),
         128,
         "300##1090B003803090201FFFF1098020004010000003F000080BE0000003E000080BF000000000000000000\
@@ -151,6 +152,7 @@ fn state_with_a_fault() {
             fault_limit: 0.002,
             pace: 0,
             operation: Operation::Automatic,
+            burden: 0,
         }),
         129,
         "300##1080B04200007010002000000000004020000003F000080BE27A0093B000080BF0327A0093B6F12033\
@@ -179,10 +181,40 @@ fn state_in_manual_operation() {
             fault_limit: 0.25,
             pace: 9,
             operation: Operation::Manual,
+            burden: 0,
         }),
         130,
         "300##1080C00200107010002000000000004020000003F000080BE27A0093B000080BF05CDCC8C3E0000803E\
         090100008284BD",
+    );
+}
+
+/// A payload of 2.5 kg less than announced, in the last bytes that were padding.
+#[test]
+fn state_with_a_burden() {
+    check(
+        Message::State(State {
+            mode: Mode::Moving,
+            cause: Cause::None,
+            limits: LimitFlags::PREDICTED,
+            queue: 1,
+            completed: 7,
+            overruns: 1,
+            rejected: 2,
+            worst_tick: 0,
+            law: Law::ComputedTorqueJoint,
+            compensation: Compensation::Observer,
+            tracking_error: [0.5, -0.25, 0.0021, -1.0],
+            fault_axis: FaultAxis::None,
+            fault_value: 0.0,
+            fault_limit: 0.0,
+            pace: 100,
+            operation: Operation::Automatic,
+            burden: -250,
+        }),
+        131,
+        "300##1060000200107010002000000000004020000003F000080BE27A0093B000080BF000000000000000000\
+        640006FF83B69F",
     );
 }
 

@@ -76,6 +76,11 @@ impl Controller {
         self.heat.shares()
     }
 
+    /// Mass that the lift feels beyond the announced payload, kg.
+    pub fn burden(&self) -> f32 {
+        self.burden.mass()
+    }
+
     /// Every limit that has acted since the last call.
     pub fn take_limits(&mut self) -> LimitFlags {
         core::mem::take(&mut self.limits)

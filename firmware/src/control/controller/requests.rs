@@ -4,6 +4,7 @@ use nalgebra::Vector4;
 use protocol::messages::{Compensation, MotionRequest, Refusal, RefusalReason};
 
 use super::Controller;
+use crate::control::burden::Burden;
 use crate::control::laws::{Gains, Selection};
 use crate::control::states::{Event, State};
 use crate::mechanics::arm::{ModelError, Payload, Rule};
@@ -88,6 +89,7 @@ impl Controller {
                     .map_err(payload_refusal)?;
                 self.setup.payload = payload;
                 self.body = Body::new(&self.config.arm, &self.setup.payload);
+                self.burden = Burden::new();
                 self.forget();
                 Answer::Now
             }

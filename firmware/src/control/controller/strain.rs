@@ -89,7 +89,7 @@ impl Controller {
     }
 
     /// What need not be done in every sample. Looks for chatter, and accounts for the heat of the motors: too much of it slows down the moves
-    /// that begin from now on, and what that does not cool stops the arm.
+    /// that begin from now on, and what that does not cool stops the arm. Weighs what the lift carries.
     /// It stands for `samples` samples.
     pub fn tend(&mut self, samples: u32) {
         let period = self.config.period.seconds();
@@ -115,6 +115,13 @@ impl Controller {
             self.limits = self.limits | LimitFlags::WARM;
         }
         self.queue.set_cool_pace(pace);
+        if self.state.is_powered() && !self.state.is_braking() {
+            let time = samples as f32 * period;
+            let gravity = self.config.arm.gravity;
+            let heavier = 1.0 - self.setpoint.reference.qdd.z / gravity;
+            let pull = self.observer.residual().z;
+            self.burden.account(pull, gravity, heavier, time);
+        }
     }
 
     fn blame(&mut self, axis: Axis, fault: Fault) {

@@ -12,6 +12,9 @@ use sim::scenario::Ending;
 use sim::setup::RunConfig;
 use sim::summary::{Injected, Summary};
 
+/// kg that the lift has to feel beyond what was announced to be told: several times what friction leaves in a stroke.
+const TOLD_BURDEN: f64 = 0.5;
+
 /// A line of text; writing to a string cannot fail.
 macro_rules! line {
     ($text:ident, $($arg:tt)*) => {{
@@ -190,6 +193,15 @@ fn load(summary: &Summary, text: &mut String) {
             text,
             "  pace              down to {:.0} % of the planned speed: an override, a move that was not held, warm motors, or too little torque, as under a heavier load",
             summary.pace * 100.0
+        );
+    }
+    let burden = summary.burden_kg;
+    if burden.abs() >= TOLD_BURDEN {
+        let more = if burden > 0.0 { "more" } else { "less" };
+        line!(
+            text,
+            "  burden            the lift feels {:.1} kg {more} than was announced",
+            burden.abs()
         );
     }
 }
