@@ -57,11 +57,12 @@ impl Profile {
                 }
             }
             Self::Fd => {
-                if let Some((covered, crc)) = frame.split_last_chunk_mut::<2>()
-                    && let Some(last) = covered.last_mut()
-                {
-                    *last = counter;
-                    *crc = crc16(data_id, covered).to_be_bytes();
+                if let Some(end) = frame.last_chunk_mut::<3>() {
+                    *end = [counter, 0, 0];
+                    let crc = remainder(data_id, frame);
+                    if let Some(place) = frame.last_chunk_mut::<2>() {
+                        *place = crc.to_be_bytes();
+                    }
                 }
             }
         }
@@ -71,18 +72,17 @@ impl Profile {
     /// frame and data id, or the frame is too short to hold it.
     #[must_use]
     pub fn check(self, data_id: u16, frame: &[u8]) -> Option<(&[u8], u8)> {
-        let covered = match self {
+        match self {
             Self::Classical => {
                 let (covered, &[crc]) = frame.split_last_chunk()?;
-                (crc == crc8(data_id, covered)).then_some(covered)
+                let (&counter, payload) = covered.split_last()?;
+                (crc == crc8(data_id, covered)).then_some((payload, counter))
             }
             Self::Fd => {
-                let (covered, &crc) = frame.split_last_chunk()?;
-                (u16::from_be_bytes(crc) == crc16(data_id, covered)).then_some(covered)
+                let (payload, &[counter, _, _]) = frame.split_last_chunk()?;
+                (remainder(data_id, frame) == 0).then_some((payload, counter))
             }
-        }?;
-        let (&counter, payload) = covered.split_last()?;
-        Some((payload, counter))
+        }
     }
 }
 
@@ -93,25 +93,39 @@ fn crc8(data_id: u16, bytes: &[u8]) -> u8 {
     digest.finalize()
 }
 
-/// `CRC_16_IBM_3740`, four bytes per step and without a table: it runs over every frame of every sample.
-fn crc16(data_id: u16, bytes: &[u8]) -> u16 {
-    let (words, rest) = bytes.as_chunks::<4>();
-    // All ones, then the two bytes of the data id.
-    let mut crc = remainder_16(0xFFFF ^ u32::from(data_id));
-    for word in words {
-        crc = remainder_16(crc << 16 ^ u32::from_be_bytes(*word));
+/// Remainder of data id and frame divided by the generator of `CRC_16_IBM_3740`, P = x^16 + x^12 + x^5 + 1. It is the CRC of
+/// a frame that ends with two zeros in place of it, and 0 for one that ends with its CRC.
+///
+/// Without a table, since it runs over every frame of every sample. Bit k of a number is the coefficient of x^k.
+fn remainder(data_id: u16, frame: &[u8]) -> u16 {
+    let (bytes, words) = frame.as_rchunks::<4>();
+    // The CRC begins with all ones, which meet the two bytes of the data id.
+    let mut start = u64::from(0xFFFF ^ data_id);
+    for byte in bytes {
+        start = start << 8 ^ u64::from(*byte);
     }
-    let (pairs, rest) = rest.as_chunks::<2>();
-    for pair in pairs {
-        crc = remainder_16(crc ^ u32::from(u16::from_be_bytes(*pair)));
+    let mut rest = ((start >> 32) as u32, start as u32);
+    // In pairs, so that what is high need not change places with what is low.
+    let (first, pairs) = words.as_rchunks::<2>();
+    for word in first {
+        rest = append(rest, *word);
     }
-    for byte in rest {
-        crc = remainder_16(crc >> 8 ^ u32::from(*byte)) ^ crc << 8 & 0xFF00;
+    for [first, second] in pairs {
+        rest = append(append(rest, *first), *second);
     }
-    crc as u16
+    let (high, low) = rest;
+    (remainder_16(remainder_16(high) ^ low >> 16) ^ low) as u16
 }
 
-/// Remainder of `a`·x^16 divided by P = x^16 + x^12 + x^5 + 1; bit k of a number is the coefficient of x^k.
+/// Remainder of `high`·x^64 + `low`·x^32 + `word` in 64 bits. P divides x^64 + x^48 + x^20 + 1 as well, as squaring is linear modulo 2.
+const fn append((high, low): (u32, u32), word: [u8; 4]) -> (u32, u32) {
+    // The half of `high` that x^48 leaves at x^64 goes the same way.
+    let high = high ^ high >> 16;
+    let word = u32::from_be_bytes(word);
+    (low ^ high << 16 ^ high >> 12, word ^ high << 20 ^ high)
+}
+
+/// Remainder of `a`·x^16.
 ///
 /// The quotient is the integral part of `a` / (1 + f) with f = x^-4 + x^-11 + x^-16. Modulo 2 that is `a` times
 /// (1 + f)(1 + f^2)(1 + f^4), since f^8 = x^-32 + ... shifts out all 32 bits and squaring doubles each exponent. The
