@@ -154,7 +154,8 @@ impl Node {
         }
         let mut planned = false;
         if let Some(frame) = received {
-            match codec::decode(frame) {
+            // By reference: taken out of the result, the message would be copied.
+            match &codec::decode(frame) {
                 Ok(received) => {
                     planned = self.take(&received.message, received.counter, now, bus, probe);
                 }

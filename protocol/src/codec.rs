@@ -15,8 +15,8 @@ use core::fmt;
 
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::frame::{CanFrame, FD_MAX, FrameKind, StandardId};
-use crate::messages::{EStop, EStopReason, Message};
+use crate::frame::{CanFrame, FD_MAX};
+use crate::messages::{Command, EStop, EStopReason, Feedback, Message};
 use crate::packed::Packed;
 use crate::schema::{Content, Kind, MessageInfo};
 use crate::table;
@@ -114,22 +114,13 @@ pub fn encode_with<T>(
     look: impl FnOnce(&CanFrame) -> T,
 ) -> Result<T, EncodeError> {
     let info = info_of(message);
-    let id = StandardId::new(info.id).ok_or(EncodeError::TooLong)?;
-    let kind = if info.is_fd() {
-        FrameKind::Fd {
-            brs: true,
-            esi: false,
-        }
-    } else {
-        FrameKind::Classical { remote: false }
-    };
-    let mut frame = CanFrame::zeroed(id, kind, info.len).ok_or(EncodeError::TooLong)?;
+    let mut frame = CanFrame::of(info);
     let data = frame.data_mut();
     let body = data
         .get_mut(..info.body_len())
         .ok_or(EncodeError::TooLong)?;
     write(message, body).ok_or(EncodeError::TooLong)?;
-    check_values(message, info, body).map_err(EncodeError::Value)?;
+    check_values(info, body).map_err(EncodeError::Value)?;
     if let Some(profile) = info.protection {
         profile.protect(info.id, counter, data);
     }
@@ -174,9 +165,12 @@ pub fn decode(frame: &CanFrame) -> Result<Received, DecodeError> {
             (body, Some(counter))
         }
     };
-    let message = read(info.content, body)?;
-    check_values(&message, info, body).map_err(DecodeError::Value)?;
-    Ok(Received { message, counter })
+    if info.content == Content::Feedback && has_range::<_, Feedback>(body) {
+        // That of every sample straight to its place.
+        let message = Message::Feedback(unpack(body)?);
+        return Ok(Received { message, counter });
+    }
+    read(info, body, counter)
 }
 
 /// The row of the table for this message.
@@ -224,8 +218,10 @@ fn write(message: &Message, body: &mut [u8]) -> Option<()> {
 }
 
 /// The one message that is written as `body`.
-fn read(content: Content, body: &[u8]) -> Result<Message, DecodeError> {
-    Ok(match content {
+// Out of line: most frames are feedback.
+#[inline(never)]
+fn read(info: &MessageInfo, body: &[u8], counter: Option<u8>) -> Result<Received, DecodeError> {
+    let message = match info.content {
         Content::Nmt => Message::Nmt(take(body)?),
         Content::EStop => Message::EStop(take(body)?),
         Content::Emergency(node) => Message::Emergency(node, take(body)?),
@@ -237,9 +233,12 @@ fn read(content: Content, body: &[u8]) -> Result<Message, DecodeError> {
         Content::ParameterReply(server) => Message::ParameterReply(server, take(body)?),
         Content::ParameterRequest(server) => Message::ParameterRequest(server, take(body)?),
         Content::Heartbeat(node) => Message::Heartbeat(node, take(body)?),
-    })
+    };
+    check_values(info, body).map_err(DecodeError::Value)?;
+    Ok(Received { message, counter })
 }
 
+#[inline(always)]
 fn unpack<const LEN: usize, T: Packed<LEN>>(body: &[u8]) -> Result<T, DecodeError> {
     let body = body.try_into().map_err(|_| DecodeError::Malformed)?;
     T::unpack(body).ok_or(DecodeError::Malformed)
@@ -258,15 +257,15 @@ fn take<T: Serialize + DeserializeOwned>(body: &[u8]) -> Result<T, DecodeError> 
     Ok(message)
 }
 
+/// Whether the floats of a packed message are in their range.
+fn has_range<const LEN: usize, T: Packed<LEN>>(body: &[u8]) -> bool {
+    body.try_into().is_ok_and(T::in_range)
+}
+
 /// Applies the table's ranges to the bytes: the sender before sending, the receiver before use.
-fn check_values(message: &Message, info: &MessageInfo, body: &[u8]) -> Result<(), ValueError> {
-    let in_range = match message {
-        Message::Feedback(feedback) => feedback.in_range(),
-        Message::Command(command) => command.in_range(),
-        _ => false,
-    };
+fn check_values(info: &MessageInfo, body: &[u8]) -> Result<(), ValueError> {
     // For the messages of every sample, the table is only needed to name what is wrong.
-    if in_range {
+    if info.content == Content::Command && has_range::<_, Command>(body) {
         return Ok(());
     }
     check_by_table(info, body)

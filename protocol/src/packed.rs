@@ -16,8 +16,8 @@ pub(crate) trait Packed<const LEN: usize>: Sized {
     /// Fills the bytes; `None` if there are fewer than the fields take, which the tests of the layout rule out.
     fn pack(&self, body: &mut [u8; LEN]) -> Option<()>;
 
-    /// Whether all floats are finite and in the range that the table gives them.
-    fn in_range(&self) -> bool;
+    /// Whether all floats in these bytes are finite and in the range that the table gives them.
+    fn in_range(body: &[u8; LEN]) -> bool;
 }
 
 const FEEDBACK_LEN: usize = 45;
@@ -27,34 +27,50 @@ const COMMAND_LEN: usize = 21;
 const _: () = assert!(FEEDBACK_LEN == table::FEEDBACK.body_len());
 const _: () = assert!(COMMAND_LEN == table::COMMAND.body_len());
 
-const TORQUE_MAX: f32 = magnitude(&table::COMMAND);
+const VELOCITY: Floats = Floats::of(&table::FEEDBACK);
+const TORQUE: Floats = Floats::of(&table::COMMAND);
 
-/// Greatest magnitude of the floats of a message with a single float signal, of symmetric range.
-const fn magnitude(info: &MessageInfo) -> f32 {
-    let (mut found, mut greatest) = (0, 0.0);
-    let mut signals = info.signals;
-    while let [signal, rest @ ..] = signals {
-        if let Kind::F32 { min, max } = signal.kind {
-            assert!(min == -max);
-            (found, greatest) = (found + 1, max);
-        }
-        signals = rest;
-    }
-    assert!(found == 1);
-    greatest
+/// The only float signal of a message, of symmetric range.
+struct Floats {
+    /// First byte.
+    at: usize,
+    /// Greatest magnitude.
+    max: f32,
 }
 
-fn all_within(values: &[f32; 4], max: f32) -> bool {
-    // Comparison with NaN is false.
-    values.iter().all(|value| value.abs() <= max)
+impl Floats {
+    const fn of(info: &MessageInfo) -> Self {
+        let (mut found, mut floats) = (0, Self { at: 0, max: 0.0 });
+        let mut signals = info.signals;
+        while let [signal, rest @ ..] = signals {
+            if let Kind::F32 { min, max } = signal.kind {
+                assert!(min == -max);
+                let at = signal.offset;
+                (found, floats) = (found + 1, Self { at, max });
+            }
+            signals = rest;
+        }
+        assert!(found == 1);
+        floats
+    }
+
+    /// Whether all four are finite and in range in this body.
+    #[inline(always)]
+    fn hold(&self, body: &[u8]) -> bool {
+        let floats = body.get(self.at..).and_then(<[u8]>::first_chunk::<16>);
+        // The bits of magnitudes compare like integers, and those of NaN are greater than any.
+        let holds = |float: &[u8; 4]| u32::from_le_bytes(*float) << 1 <= self.max.to_bits() << 1;
+        floats.is_some_and(|floats| floats.as_chunks().0.iter().all(holds))
+    }
 }
 
 impl Feedback {
     /// Greatest speed of a shaft that a feedback can carry, rad/s.
-    pub const MAX_VELOCITY: f32 = magnitude(&table::FEEDBACK);
+    pub const MAX_VELOCITY: f32 = VELOCITY.max;
 }
 
 impl Packed<FEEDBACK_LEN> for Feedback {
+    #[inline(always)]
     fn unpack(body: &[u8; FEEDBACK_LEN]) -> Option<Self> {
         let mut fields = Fields(body);
         let feedback = Self {
@@ -77,8 +93,8 @@ impl Packed<FEEDBACK_LEN> for Feedback {
         room.0.is_empty().then_some(())
     }
 
-    fn in_range(&self) -> bool {
-        all_within(&self.velocity, Self::MAX_VELOCITY)
+    fn in_range(body: &[u8; FEEDBACK_LEN]) -> bool {
+        VELOCITY.hold(body)
     }
 }
 
@@ -101,8 +117,8 @@ impl Packed<COMMAND_LEN> for Command {
         room.0.is_empty().then_some(())
     }
 
-    fn in_range(&self) -> bool {
-        all_within(&self.torque, TORQUE_MAX)
+    fn in_range(body: &[u8; COMMAND_LEN]) -> bool {
+        TORQUE.hold(body)
     }
 }
 

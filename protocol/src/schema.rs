@@ -1,7 +1,7 @@
 //! Description of a message.
 
 use crate::e2e::Profile;
-use crate::frame::{CanFrame, FrameKind, StandardId};
+use crate::frame::CanFrame;
 use crate::messages::{Node, Server};
 
 /// Type and meaning of the bytes of a signal. All are little-endian.
@@ -135,20 +135,12 @@ impl MessageInfo {
     }
 
     /// A frame of this message with about half of the possible stuff bits: alternating bits need none, equal ones
-    /// the most. `None` if no frame has the message's length.
+    /// the most.
     #[must_use]
-    pub fn specimen(&self) -> Option<CanFrame> {
-        let kind = if self.is_fd() {
-            FrameKind::Fd {
-                brs: true,
-                esi: false,
-            }
-        } else {
-            FrameKind::Classical { remote: false }
-        };
-        let mut frame = CanFrame::zeroed(StandardId::new(self.id)?, kind, self.len)?;
+    pub fn specimen(&self) -> CanFrame {
+        let mut frame = CanFrame::of(self);
         frame.data_mut().fill(0x0F);
-        Some(frame)
+        frame
     }
 
     /// Bytes before the protection: signals and padding.

@@ -316,7 +316,7 @@ const _: () = {
         } else {
             frame::CLASSICAL_MAX
         };
-        assert!(info.len <= longest);
+        assert!(info.id <= 0x7FF && info.len <= longest);
         assert!(matches!(frame::fd_length(info.len), Some(len) if len == info.len));
         let mut signals = info.signals;
         while let [signal, rest @ ..] = signals {

@@ -83,8 +83,8 @@ impl Node {
         }
     }
 
-    pub(super) fn reject(&mut self, error: DecodeError, frame: &CanFrame) {
-        self.received.refuse(&error);
+    pub(super) fn reject(&mut self, error: &DecodeError, frame: &CanFrame) {
+        self.received.refuse(error);
         self.strangers = self.strangers.saturating_add(1);
         if table::FEEDBACK.identifies(frame) {
             let cause = match error {

@@ -48,7 +48,7 @@ impl Impostor {
     fn frame(&mut self) -> Option<CanFrame> {
         match self.disguise {
             Disguise::Poor => {
-                let blank = self.message.specimen()?;
+                let blank = self.message.specimen();
                 let data = &mut [0; FD_MAX][..blank.data().len()];
                 data.fill_with(|| self.random.rand_range(0..256) as u8);
                 Some(like(&blank, data))

@@ -1,6 +1,5 @@
 //! Times and loads of the bus that follow from the table of messages, before anything runs.
 
-use protocol::frame::CanFrame;
 use protocol::schema::{MessageInfo, Rate};
 use protocol::table;
 use protocol::time::Duration;
@@ -12,7 +11,7 @@ use crate::controller::COMPUTE;
 /// Time from a sample until its command acts: two frames and the computing time, on an
 /// otherwise idle bus with about half of the possible stuff bits.
 pub(crate) fn command_delay(timing: &BitTiming) -> Duration {
-    let frame = |info| timing.duration(FrameBits::exact(&specimen(info)));
+    let frame = |info: &MessageInfo| timing.duration(FrameBits::exact(&info.specimen()));
     frame(&table::FEEDBACK) + COMPUTE + frame(&table::COMMAND)
 }
 
@@ -20,7 +19,7 @@ pub(crate) fn command_delay(timing: &BitTiming) -> Duration {
 /// can be. Where samples are nearer to each other, a command may come after the next one.
 #[must_use]
 pub fn slowest_answer(timing: &BitTiming) -> Duration {
-    let frame = |info: &MessageInfo| timing.duration(FrameBits::worst_case(&specimen(info)));
+    let frame = |info: &MessageInfo| timing.duration(FrameBits::worst_case(&info.specimen()));
     // One that is under way when the sample is taken, whatever its priority.
     let others = table::TABLE
         .iter()
@@ -30,11 +29,6 @@ pub fn slowest_answer(timing: &BitTiming) -> Duration {
         .max()
         .unwrap_or(Duration::ZERO);
     in_the_way + frame(&table::FEEDBACK) + COMPUTE + frame(&table::COMMAND)
-}
-
-fn specimen(info: &MessageInfo) -> CanFrame {
-    info.specimen()
-        .expect("the message table holds lengths that frames can have")
 }
 
 /// Worst-case load of the bus at a control rate.
@@ -51,7 +45,7 @@ pub fn admit(timing: &BitTiming, rate_hz: f64) -> Result<f64, Overload> {
                 Rate::Event => return None,
             };
             Some(Traffic {
-                frame: specimen(info),
+                frame: info.specimen(),
                 rate,
             })
         })

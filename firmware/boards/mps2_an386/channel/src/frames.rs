@@ -19,7 +19,7 @@ pub fn frame_to_bytes(frame: &CanFrame) -> [u8; FRAME_LEN] {
     bytes
 }
 
-/// Writes a frame as `struct canfd_frame`; bytes beyond its data are left unchanged.
+/// Writes a frame as `struct canfd_frame`.
 pub(crate) fn write_frame(frame: &CanFrame, record: &mut [u8; FRAME_LEN]) {
     let (remote, flags) = match frame.kind() {
         FrameKind::Classical { remote } => (remote, 0),
@@ -27,17 +27,18 @@ pub(crate) fn write_frame(frame: &CanFrame, record: &mut [u8; FRAME_LEN]) {
     };
     let id =
         frame.raw_id() | (u32::from(frame.is_extended()) * EXTENDED) | (u32::from(remote) * REMOTE);
-    let data = frame.data();
     let len = if remote {
         usize::from(frame.dlc())
     } else {
-        data.len()
+        frame.data().len()
     };
-    let [a, b, c, d] = id.to_le_bytes();
-    let (header, rest) = record.split_at_mut(8);
-    header.copy_from_slice(&[a, b, c, d, len as u8, flags, 0, 0]);
-    if let Some(place) = rest.get_mut(..data.len()) {
-        place.copy_from_slice(data);
+    if let Some((header, data)) = record.split_first_chunk_mut() {
+        let shape = len as u32 | u32::from(flags) << 8;
+        *header = (u64::from(shape) << 32 | u64::from(id)).to_le_bytes();
+        // All of it: an unknown number of bytes takes longer.
+        if let Some(place) = data.first_chunk_mut() {
+            *place = *frame.padded();
+        }
     }
 }
 
