@@ -111,7 +111,7 @@ proptest! {
     }
 
     #[test]
-    fn friction_takes_power_and_is_odd(qd in speed(), slow in 1e-4..=1.0f32, wider in 1.0..=50.0f32) {
+    fn friction_takes_power_and_is_odd(qd in speed(), slow in 1e-4..=1.0f32) {
         let (train, drive) = (IRB_930.drive, Drive::new(&IRB_930.drive));
         let qd = qd * slow;
         let friction = drive.friction(&qd);
@@ -123,10 +123,6 @@ proptest! {
         });
         let bound = wide(&train.coulomb) * (1.5e-6 + 4.0 * U) + exact.abs() * (4.0 * U);
         assert_close("friction", &friction, &exact, &bound);
-
-        let gentle = drive.friction_at(&qd, &(train.coulomb_eps * wider));
-        let slack = train.coulomb * 4e-6;
-        prop_assert!((0..4).all(|i| gentle[i].abs() <= friction[i].abs() + slack[i]));
     }
 
     #[test]

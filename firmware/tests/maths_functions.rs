@@ -104,6 +104,15 @@ fn hyperbolic_tangent_keeps_its_error() {
     }
 }
 
+/// Below 4 it is far from 1; from there on to where it is 1 by definition there is nothing between two of these numbers.
+#[test]
+fn hyperbolic_tangent_does_not_exceed_one() {
+    for bits in 4.0f32.to_bits()..=8.0f32.to_bits() {
+        let x = f32::from_bits(bits);
+        assert!(tanh(x) <= 1.0, "tanh({x:e}) is {}", tanh(x));
+    }
+}
+
 #[test]
 fn wrapped_angle_keeps_its_error() {
     for range in [8.0, 8190.0] {

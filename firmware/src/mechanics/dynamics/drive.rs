@@ -31,7 +31,8 @@ pub struct Drive {
     rotor: Vector4<f32>,
     viscous: Vector4<f32>,
     coulomb: Vector4<f32>,
-    coulomb_eps: Vector4<f32>,
+    /// Reciprocal of the model's `coulomb_eps`.
+    per_eps: Vector4<f32>,
     /// Motor angle of one encoder count (rad).
     count: f32,
 }
@@ -47,7 +48,7 @@ impl Drive {
             rotor: train.rotor_inertia,
             viscous: train.viscous,
             coulomb: train.coulomb,
-            coulomb_eps: train.coulomb_eps,
+            per_eps: train.coulomb_eps.map(|eps| 1.0 / eps),
             count: TAU / train.encoder_counts as f32,
         }
     }
@@ -123,18 +124,11 @@ impl Drive {
 
     /// Friction efforts at joint speeds `qd` (N m, lift N), with the sign of the effort that overcomes them: viscous, and
     /// Coulomb smoothed over the model's `coulomb_eps`.
+    #[inline(always)]
     #[must_use]
     pub fn friction(&self, qd: &Vector4<f32>) -> Vector4<f32> {
-        self.friction_at(qd, &self.coulomb_eps)
-    }
-
-    /// Like [`Drive::friction`], with Coulomb friction smoothed over the speeds `eps`, all greater than zero.
-    ///
-    /// To compensate friction at the *measured* speed, `eps` has to be wider than in the friction itself: a narrow step
-    /// would turn measurement noise into chatter. Not on the control path: the laws compensate at the planned speed.
-    #[must_use]
-    pub fn friction_at(&self, qd: &Vector4<f32>, eps: &Vector4<f32>) -> Vector4<f32> {
-        let step = qd.component_div(eps).map(tanh);
+        let x = qd.component_mul(&self.per_eps);
+        let step = Vector4::new(tanh(x.x), tanh(x.y), tanh(x.z), tanh(x.w));
         self.viscous.component_mul(qd) + self.coulomb.component_mul(&step)
     }
 
@@ -143,7 +137,7 @@ impl Drive {
     /// only near rest, where torque is plentiful.
     #[must_use]
     pub fn coulomb_friction(&self, qd: &Vector4<f32>) -> Vector4<f32> {
-        let step = qd.component_div(&self.coulomb_eps);
+        let step = qd.component_mul(&self.per_eps);
         self.coulomb
             .component_mul(&step.map(|x| clamp(x, -1.0, 1.0)))
     }
