@@ -56,14 +56,15 @@ fn heat_follows_the_square_of_the_effort() {
     }
 }
 
-/// A part longer than all the samples stand for is as long as they: the last one is all that counts.
+/// A part longer than all the samples stand for is as long as they: their mean is all that counts.
 #[test]
 fn no_part_is_more_than_all() {
     let mut heat = Heat::new();
-    let efforts = [times([1.0; 4]), times([0.5, 0.5, 2.0, 0.5])];
+    let (even, uneven) = (times([1.0; 4]), times([0.5, 0.5, 2.0, 0.5]));
+    let efforts = [even, uneven, uneven, even];
     let found = heat.account(&efforts, &CONTINUOUS, 100.0);
-    assert_eq!(found, (Axis::Lift, 4.0));
-    assert_eq!(heat.shares(), &Vector4::new(0.25, 0.25, 4.0, 0.25));
+    assert_eq!(found, (Axis::Lift, 2.5));
+    assert_eq!(heat.shares(), &Vector4::new(0.625, 0.625, 2.5, 0.625));
 }
 
 /// From all of it at 90 % to three tenths at 100 %.

@@ -92,7 +92,8 @@ impl Chatter {
         rise: &Vector4<f32>,
         period: f32,
     ) -> Option<(Axis, f32)> {
-        let [a, b, c, d] = self.torques;
+        // In their order, by reference: in registers they would leave no room for what follows.
+        let [a, b, c, d] = &self.torques;
         let [a, b, c, d] = match usize::from(self.kept) % KEPT {
             0 => [a, b, c, d],
             1 => [b, c, d, a],

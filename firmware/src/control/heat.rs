@@ -35,18 +35,21 @@ impl Heat {
         &self.shares
     }
 
-    /// Accounts for a part of the time constant in which the efforts were like these, N m (lift N). Returns the warmest axis.
+    /// Accounts for a part of the time constant in which the torques were like these four, N m (lift N), each for a quarter of it. Returns
+    /// the warmest axis.
     pub fn account(
         &mut self,
-        efforts: &[Vector4<f32>],
+        [a, b, c, d]: &[Vector4<f32>; 4],
         continuous: &Vector4<f32>,
         part: f32,
     ) -> (Axis, f32) {
-        let part = clamp(part / efforts.len() as f32, 0.0, 1.0);
-        for effort in efforts {
-            let share = effort.component_div(continuous);
-            self.shares += (share.component_mul(&share) - self.shares) * part;
-        }
+        let square = |torque: &Vector4<f32>| torque.component_mul(torque);
+        let mean = (square(a) + square(b) + square(c) + square(d)) * 0.25;
+        // What four steps of a quarter leave of what there was is (1 - quarter)^4.
+        let quarter = clamp(0.25 * part, 0.0, 1.0);
+        let rest = 1.0 - quarter;
+        let change = quarter * (1.0 + rest) * (1.0 + rest * rest);
+        self.shares += (mean.component_div(&square(continuous)) - self.shares) * change;
         let mut warmest = (Axis::Shoulder, 0.0);
         for axis in Axis::ALL {
             let share = axis.of(&self.shares);

@@ -99,13 +99,12 @@ impl Controller {
             let limit = f32::from(CHATTER_PERCENT);
             self.blame(axis, Fault::value(Cause::Chatter, percent, limit));
         }
-        let drive = &self.body.drive;
-        let torques = self.chatter.torques();
-        // Of each motor by itself.
-        let efforts = torques.map(|torque| drive.own_torque(&torque));
         let part = samples as f32 * period / self.setup.thermal_time;
-        let continuous = &self.config.arm.limits.effort_continuous;
-        let (axis, heat) = self.heat.account(&efforts, continuous, part);
+        // Of each motor by itself.
+        let continuous = (self.config.arm.limits.effort_continuous)
+            .component_div(&self.body.drive.own_torque(&Vector4::repeat(1.0)));
+        let torques = self.chatter.torques();
+        let (axis, heat) = self.heat.account(torques, &continuous, part);
         let limit = f32::from(OVERLOAD_PERCENT);
         if heat > limit * 1e-2 {
             self.blame(axis, Fault::value(Cause::Overload, heat * 100.0, limit));
