@@ -18,7 +18,8 @@ mod transitions;
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
-    Cause, ControlWord, Fault, LimitFlags, MotionReply, MotionRequest, Operation, Outcome, Refusal,
+    Cause, Compensation, ControlWord, Fault, Law, LimitFlags, MotionReply, MotionRequest,
+    Operation, Outcome, Refusal,
 };
 use protocol::parameters::ControllerParameter as Parameter;
 use protocol::time::Period;
@@ -28,8 +29,7 @@ use crate::control::burden::Burden;
 use crate::control::chatter::Chatter;
 use crate::control::heat::Heat;
 use crate::control::laws::observer::MomentumObserver;
-use crate::control::laws::pd_gravity;
-use crate::control::laws::{ControlInput, Memory, Model, Motion, Task};
+use crate::control::laws::{ControlInput, Memory, Motion, Selection};
 use crate::control::limits;
 use crate::control::monitor::{Felt, Monitor};
 use crate::control::phase::{Phase, Probe};
@@ -38,7 +38,6 @@ use crate::control::setup::Setup;
 use crate::control::states::State;
 use crate::mechanics::arm::ArmModel;
 use crate::mechanics::body::Body;
-use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::clamp;
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use crate::trajectory::{Reference, Setpoint};
@@ -241,33 +240,39 @@ impl Controller {
             // The brake holds: the load it carries must not be mistaken for a disturbance. Nor what has not been seen.
             self.unlearn();
         }
-        let Setpoint { reference, ahead } = &self.setpoint;
+        let reference = &self.setpoint.reference;
         self.error = reference.q - q;
 
         let motion = Motion {
             q,
             qd,
             torque: measured_torque,
-            reference,
+            setpoint: &self.setpoint,
             mean_qd: mean_velocity(&before, reference, readings.steps, period),
-            qd_ahead: ahead.qd,
-            qdd_ahead: ahead.qdd,
             lead,
             period,
             elapsed: period * readings.steps as f32,
-            excess: self.excess,
+            excess: &self.excess,
+        };
+        let mut selection = &self.setup.selection;
+        let holding = Selection {
+            law: Law::PdGravity,
+            ..*selection
+        };
+        if self.limp {
+            // Axis by axis: what the arm's encoders show must not reach the shaft.
+            selection = &holding;
+        }
+        let input = ControlInput {
+            motion: &motion,
+            geometry: &self.config.arm.geometry,
+            body: &self.body,
         };
         probe.end(Phase::Reference);
-        let trig = Trig::new(&q);
-        let task = Task::new(&self.config.arm.geometry, &trig, &motion);
-        probe.end(Phase::Kinematics);
-        let model = Model::new(&self.body, &trig, &motion);
-        probe.end(Phase::Dynamics);
-        let corners = [
-            self.setup.selection.gains.observer,
-            self.config.least_corner,
-        ];
-        self.observer.update(&motion, &model, corners);
+        let (mut torque, model) = selection.torque(&input, &mut self.memory);
+        probe.end(Phase::Law);
+        let corners = [selection.gains.observer, self.config.least_corner];
+        self.observer.update(&self.body, &motion, &model, corners);
         let felt = self.observer.residual();
         if let Some(axis) = self.monitor.feels(felt)
             && !self.limp
@@ -278,31 +283,22 @@ impl Controller {
                 return self.react(felt);
             }
         }
-        let input = ControlInput {
-            motion: &motion,
-            task: &task,
-            model: &model,
-            nominal_inertia: &self.body.nominal_inertia,
-            disturbance: self.observer.for_law(corners),
-        };
-        let torque = if self.limp {
-            // Axis by axis: what the arm's encoders show must not reach the shaft.
-            of_shaft(pd_gravity::torque(&input, &self.setup.selection.gains))
-        } else {
-            self.setup.selection.torque(&input, &mut self.memory)
-        };
-        if !torque.iter().all(|torque| torque.is_finite()) {
-            // No finite input leads here; should it happen, close the brake.
-            self.unlearn();
-            self.fail(Fault::because(Cause::BadValue));
-            return self.torque_off();
+        if self.limp {
+            torque = of_shaft(torque);
+        } else if selection.compensation == Compensation::Observer {
+            torque -= self.observer.for_law(corners);
         }
-        probe.end(Phase::Law);
+        probe.end(Phase::Observer);
         let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
         self.excess = limited.excess;
-        let qd = motion.qd;
         self.last_qd = qd;
         if limited.flags != LimitFlags::EMPTY {
+            if !torque.iter().all(|torque| torque.is_finite()) {
+                // No finite input leads here; should it happen, close the brake.
+                self.unlearn();
+                self.fail(Fault::because(Cause::BadValue));
+                return self.torque_off();
+            }
             self.limits = self.limits | limited.flags;
             self.ease(&torque, &qd);
             self.strain(readings, &qd);
@@ -311,7 +307,7 @@ impl Controller {
         }
         self.chatter.keep(&limited.motor_torque);
         if self.operation == Operation::Manual {
-            self.watch_tool(&task.actual.task_velocity(&qd));
+            self.watch_tool(&q, &qd);
         }
         probe.end(Phase::Limits);
         Actions {

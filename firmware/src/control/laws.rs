@@ -26,6 +26,8 @@ use nalgebra::Vector4;
 use protocol::messages::{Compensation, Law, Refusal};
 use serde::{Deserialize, Serialize};
 
+use crate::mechanics::kinematics::Trig;
+
 pub use control_input::{ControlInput, Model, Motion, Task};
 pub use gains::Gains;
 
@@ -85,20 +87,36 @@ impl Selection {
         self.gains.check(period, command_delay, integrates)
     }
 
-    /// Joint torques for one sample.
-    pub fn torque(&self, input: &ControlInput<'_>, memory: &mut Memory) -> Vector4<f32> {
+    /// Joint torques for one sample, without those of the observer, and the model that it goes on with.
+    // Out of line: so its instructions and its stack can be measured.
+    #[inline(never)]
+    pub fn torque(&self, input: &ControlInput<'_>, memory: &mut Memory) -> (Vector4<f32>, Model) {
+        let ControlInput { motion, body, .. } = input;
         let gains = &self.gains;
-        match self.law {
+        let trig = Trig::relative_in_line(&motion.q);
+        let couplings = body.lagrange.couplings(&trig);
+        let mut torque = match self.law {
             Law::KinematicJoint => kinematic_joint::torque(input, gains, memory),
-            Law::KinematicTask => kinematic_task::torque(input, gains, memory),
+            Law::KinematicTask => kinematic_task::torque(input, &trig, gains, memory),
             Law::Pid => pid::torque(input, gains, memory),
             Law::PdGravity => pd_gravity::torque(input, gains),
             Law::ComputedTorqueJoint => {
-                computed_torque::torque(input, gains, self.compensation, memory)
+                computed_torque::torque(input, &couplings, gains, self.compensation, memory)
             }
             Law::ComputedTorqueTask => {
-                computed_torque_task::torque(input, gains, self.compensation, memory)
+                let position = (&trig, &couplings);
+                computed_torque_task::torque(input, position, gains, self.compensation, memory)
             }
+        };
+        // For every law, as the observer counts with it. Last: its branches leave no register to anything that is still to be used.
+        let friction = body.drive.friction(&motion.setpoint.ahead.qd);
+        if self.law.takes_compensation() {
+            torque += friction;
         }
+        let model = Model {
+            couplings,
+            friction,
+        };
+        (torque, model)
     }
 }

@@ -10,12 +10,11 @@ listed! {
         Decode,
         /// Readings, monitor, mode, and the reference of this sample.
         Reference,
-        /// Sines, cosines, Jacobians and tool errors.
-        Kinematics,
-        /// Inertia, Coriolis, gravity and friction.
-        Dynamics,
-        /// The control law.
+        /// The control law, from motion and payload to joint torques: sines and cosines, inertia, Coriolis, gravity, friction and, of a
+        /// law in task space, Jacobians.
         Law,
+        /// What the model does not explain, and what follows from it.
+        Observer,
         /// Torque limits.
         Limits,
         /// The command encoded and handed to the bus.
@@ -34,9 +33,8 @@ impl Phase {
         match self {
             Self::Decode => "decode",
             Self::Reference => "reference",
-            Self::Kinematics => "kinematics",
-            Self::Dynamics => "dynamics",
             Self::Law => "law",
+            Self::Observer => "observer",
             Self::Limits => "limits",
             Self::Encode => "encode",
             Self::Planning => "planning",

@@ -1,13 +1,12 @@
 //! The arm as the controller believes it to be: links, payload, rotors and friction together.
 
 use core::f32::consts::FRAC_PI_2;
-use core::ops::Mul;
 
 use nalgebra::{Matrix4, Vector4, Vector5};
 
 use crate::mechanics::arm::{ArmModel, Payload};
 use crate::mechanics::dynamics::drive::Drive;
-use crate::mechanics::dynamics::lagrange::Lagrange;
+use crate::mechanics::dynamics::lagrange::{Couplings, Lagrange};
 use crate::mechanics::kinematics::Trig;
 
 /// Torques of the four joints (N m, lift N) and of the motor of the wrist (N m), which carries part of the lift's force, too.
@@ -63,38 +62,33 @@ impl Body {
             nominal_inertia: Vector4::zeros(),
         };
         let square = Trig::new(&Vector4::new(0.0, FRAC_PI_2, 0.0, 0.0));
-        body.nominal_inertia = body.mass_matrix(&square).diagonal();
+        body.nominal_inertia = body.own_inertia(&square);
         body
     }
 
-    /// Inertia matrix at the joints, rotors included.
-    pub fn mass_matrix(&self, trig: &Trig) -> MassMatrix {
-        let links = self.lagrange.mass_matrix(trig);
-        MassMatrix {
-            m11: links.m11 + self.rotor.m11,
-            m12: links.m12,
-            m14: links.m14,
-            m22: links.m22 + self.rotor.m22,
-            m24: links.m24,
-            m33: links.m33 + self.rotor.m33,
-            m34: self.rotor.m34,
-            m44: links.m44 + self.rotor.m44,
-        }
+    /// Inertia of each axis by itself, rotors included: the diagonal of the inertia matrix, kg m^2, lift kg.
+    pub fn own_inertia(&self, trig: &Trig) -> Vector4<f32> {
+        self.lagrange.mass_matrix(trig).diagonal() + self.rotor.diagonal()
     }
 
-    /// [`Body::mass_matrix`] times `qdd`, cheaper than building the matrix.
-    pub fn inertial(&self, trig: &Trig, qdd: &Vector4<f32>) -> Vector4<f32> {
-        self.with_rotors(self.lagrange.inertial(trig, qdd), qdd)
+    /// Joint torque (N m, N m, N, N m) for accelerations alone: the inertia matrix, rotors included, times `qdd`.
+    pub fn inertial(&self, couplings: &Couplings, qdd: &Vector4<f32>) -> Vector4<f32> {
+        self.with_rotors(self.lagrange.inertial(couplings, qdd), qdd)
     }
 
     /// Joint torque (N m, N m, N, N m) for a motion without friction: links and rotors.
-    pub fn frictionless(&self, trig: &Trig, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
-        self.with_rotors(self.lagrange.inverse(trig, qd, qdd), qdd)
+    pub fn frictionless(
+        &self,
+        couplings: &Couplings,
+        qd: &Vector4<f32>,
+        qdd: &Vector4<f32>,
+    ) -> Vector4<f32> {
+        self.with_rotors(self.lagrange.inverse_with(couplings, qd, qdd), qdd)
     }
 
     /// Joint torque (N m, N m, N, N m) for a motion: links, rotors and friction.
     pub fn inverse(&self, trig: &Trig, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
-        self.frictionless(trig, qd, qdd) + self.drive.friction(qd)
+        self.frictionless(&self.lagrange.couplings(trig), qd, qdd) + self.drive.friction(qd)
     }
 
     fn with_rotors(&self, mut torque: Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
@@ -103,48 +97,5 @@ impl Body {
         torque.z += self.rotor.m33 * qdd.z + self.rotor.m34 * qdd.w;
         torque.w += self.rotor.m43 * qdd.z + self.rotor.m44 * qdd.w;
         torque
-    }
-}
-
-/// The inertia matrix of a SCARA at the joints, symmetric and half empty: links couple the three turning axes, rotors lift
-/// and wrist. `mij` is the effort of axis i for a unit acceleration of axis j: kg m^2 among turning axes, kg for the lift,
-/// kg m between the two.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MassMatrix {
-    /// Shoulder, kg m^2.
-    pub m11: f32,
-    /// Shoulder and elbow, kg m^2.
-    pub m12: f32,
-    /// Shoulder and wrist, kg m^2.
-    pub m14: f32,
-    /// Elbow, kg m^2.
-    pub m22: f32,
-    /// Elbow and wrist, kg m^2.
-    pub m24: f32,
-    /// Lift, kg.
-    pub m33: f32,
-    /// Lift and wrist, by the ball-screw spline, kg m.
-    pub m34: f32,
-    /// Wrist, kg m^2.
-    pub m44: f32,
-}
-
-impl MassMatrix {
-    /// Inertia of each axis by itself.
-    pub fn diagonal(&self) -> Vector4<f32> {
-        Vector4::new(self.m11, self.m22, self.m33, self.m44)
-    }
-}
-
-impl Mul<&Vector4<f32>> for &MassMatrix {
-    type Output = Vector4<f32>;
-
-    fn mul(self, v: &Vector4<f32>) -> Vector4<f32> {
-        Vector4::new(
-            self.m11 * v.x + self.m12 * v.y + self.m14 * v.w,
-            self.m12 * v.x + self.m22 * v.y + self.m24 * v.w,
-            self.m33 * v.z + self.m34 * v.w,
-            self.m14 * v.x + self.m24 * v.y + self.m34 * v.z + self.m44 * v.w,
-        )
     }
 }

@@ -175,10 +175,7 @@ impl Jacobian {
         if self.s2.abs() < SINGULAR_SINE {
             return None;
         }
-        let scale = 1.0 / self.determinant;
-        let w1 = (self.y2 * v.x - self.x2 * v.y) * scale;
-        let w2 = (self.x1 * v.y - self.y1 * v.x) * scale;
-        Some(Vector4::new(w1, w2, -v.z, w1 + w2 - v.w))
+        Some(self.joint_speed_undamped(v))
     }
 
     /// The inverse of the task Jacobian; `None` where [`Jacobian::joint_speed`] has none.
@@ -197,18 +194,23 @@ impl Jacobian {
     /// where damping acts, hardly less, and it costs a division instead of two roots.
     fn damping_squared(&self) -> f32 {
         let least_squared = self.determinant * self.determinant / self.norm_squared();
-        let onset_squared = self.onset * self.onset;
-        if least_squared < onset_squared {
-            0.25 * (onset_squared - least_squared)
-        } else {
-            0.0
-        }
+        let gap = self.onset * self.onset - least_squared;
+        if gap > 0.0 { 0.25 * gap } else { 0.0 }
     }
 
     /// Whether [`Jacobian::joint_speed_damped`] differs from [`Jacobian::joint_speed`].
     #[must_use]
     pub fn is_damped(&self) -> bool {
-        self.damping_squared() > 0.0
+        self.determinant * self.determinant < self.onset * self.onset * self.norm_squared()
+    }
+
+    /// [`Jacobian::joint_speed`] of an arm that is not [damped](Jacobian::is_damped), and so not stretched.
+    #[must_use]
+    pub fn joint_speed_undamped(&self, v: &Vector4<f32>) -> Vector4<f32> {
+        let scale = 1.0 / self.determinant;
+        let w1 = (self.y2 * v.x - self.x2 * v.y) * scale;
+        let w2 = (self.x1 * v.y - self.y1 * v.x) * scale;
+        Vector4::new(w1, w2, -v.z, w1 + w2 - v.w)
     }
 
     /// Joint speeds for a task velocity, damped near the stretched arm: defined everywhere, bounded, continuous.

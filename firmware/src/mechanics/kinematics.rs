@@ -48,27 +48,47 @@ impl Trig {
     #[inline(never)]
     #[must_use]
     pub fn relative(q: &Vector4<f32>) -> Self {
-        Self::in_line(&Vector4::new(f32::NAN, q.y, q.z, q.w))
+        Self::relative_in_line(q)
     }
 
-    /// Inlined variant of [`Trig::new`]: components that the caller does not use are optimised away. Dynamics never
-    /// need theta1.
+    /// Inlined variant of [`Trig::relative`].
     #[inline(always)]
     #[must_use]
-    pub fn in_line(q: &Vector4<f32>) -> Self {
-        let (s1, c1) = sin_cos(q.x);
+    pub(crate) fn relative_in_line(q: &Vector4<f32>) -> Self {
         let (s2, c2) = sin_cos(q.y);
         let (s4, c4) = sin_cos(q.w);
         Self {
-            s1,
-            c1,
+            s1: f32::NAN,
+            c1: f32::NAN,
             s2,
             c2,
-            s12: s1 * c2 + c1 * s2,
-            c12: c1 * c2 - s1 * s2,
+            s12: f32::NAN,
+            c12: f32::NAN,
             s4,
             c4,
         }
+    }
+
+    /// What [`Trig::relative`] has left out, for theta1 (rad).
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn with_shoulder(&self, theta1: f32) -> Self {
+        let Self { s2, c2, .. } = *self;
+        let (s1, c1) = sin_cos(theta1);
+        Self {
+            s1,
+            c1,
+            s12: s1 * c2 + c1 * s2,
+            c12: c1 * c2 - s1 * s2,
+            ..*self
+        }
+    }
+
+    /// Inlined variant of [`Trig::new`]: components that the caller does not use are optimised away.
+    #[inline(always)]
+    #[must_use]
+    pub fn in_line(q: &Vector4<f32>) -> Self {
+        Self::relative_in_line(q).with_shoulder(q.x)
     }
 }
 

@@ -8,6 +8,7 @@ use super::path::PathPoint;
 use super::profile::{Bounds, HalfBounds, Sample};
 use crate::mechanics::arm::{ArmModel, Axis};
 use crate::mechanics::body::{Body, Torques};
+use crate::mechanics::dynamics::lagrange::Couplings;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::{cbrt, clamp, least};
 
@@ -63,7 +64,7 @@ impl TorqueBudget<'_> {
 
     /// The acceleration along the path, 1/s², and the jerk, 1/s³, that the torques and their rates of change allow an arm at rest.
     pub fn from_rest(&self, here: &PathPoint) -> (f32, f32) {
-        let push = self.body.inertial(&Trig::relative(&here.q), &here.dq);
+        let push = self.body.inertial(&self.couplings(&here.q), &here.dq);
         let need = Need {
             push: self.torques(&push),
             rest: self.torques(&self.body.lagrange.gravity()),
@@ -127,18 +128,24 @@ impl TorqueBudget<'_> {
     // Out of line, for the size of two copies.
     #[inline(never)]
     fn split(&self, rest: &Reference, push: &Vector4<f32>) -> Need {
-        let trig = Trig::relative(&rest.q);
+        let couplings = self.couplings(&rest.q);
         Need {
-            push: self.torques(&self.body.inertial(&trig, push)),
-            rest: self.load(&trig, rest),
+            push: self.torques(&self.body.inertial(&couplings, push)),
+            rest: self.load(&couplings, rest),
         }
+    }
+
+    // Out of line, for the size of one copy.
+    #[inline(never)]
+    fn couplings(&self, q: &Vector4<f32>) -> Couplings {
+        self.body.lagrange.couplings(&Trig::relative(q))
     }
 
     /// Torques of a motion.
     #[inline(never)]
-    fn load(&self, trig: &Trig, Reference { qd, qdd, .. }: &Reference) -> Torques {
+    fn load(&self, couplings: &Couplings, Reference { qd, qdd, .. }: &Reference) -> Torques {
         let Self { arm, body } = self;
-        let torque = body.frictionless(trig, qd, qdd)
+        let torque = body.frictionless(couplings, qd, qdd)
             + arm.drive.viscous.component_mul(qd)
             + body.drive.coulomb_friction(qd);
         self.torques(&torque)
@@ -196,7 +203,7 @@ impl TorqueBudget<'_> {
     /// [can creep](Self::check_creep); and its torques without Coulomb friction, which sets in at once.
     #[inline(never)]
     pub fn torque_scale(&self, reference: &Reference) -> (f32, Torques) {
-        let full = self.load(&Trig::relative(&reference.q), reference);
+        let full = self.load(&self.couplings(&reference.q), reference);
         let dry = self.body.drive.coulomb_friction(&reference.qd);
         let smooth = full - self.torques(&dry);
         let limits = &self.body.planned_torque;

@@ -1,10 +1,9 @@
 //! The controller's laws in the form of the paper: in continuous time, without friction and rotors.
 
-use firmware::control::laws::{ControlInput, Gains, Memory, Model, Motion, Selection, Task};
+use firmware::control::laws::{ControlInput, Gains, Memory, Motion, Selection};
 use firmware::mechanics::arm::{ArmModel, DriveTrain, IRB_930};
 use firmware::mechanics::body::Body;
-use firmware::mechanics::kinematics::Trig;
-use firmware::trajectory::Reference;
+use firmware::trajectory::{Rates, Reference, Setpoint};
 use nalgebra::Vector4;
 use protocol::messages::{Compensation, Law};
 
@@ -59,28 +58,29 @@ impl Controller {
             qd: reference.qd.cast(),
             qdd: reference.qdd.cast(),
         };
+        let Reference {
+            qd: wanted, qdd, ..
+        } = reference;
+        let ahead = Rates { qd: wanted, qdd };
+        let setpoint = Setpoint { reference, ahead };
         let motion = Motion {
             q,
             qd: qd.cast(),
             torque: Vector4::zeros(),
-            reference: &reference,
-            mean_qd: reference.qd,
-            qd_ahead: reference.qd,
-            qdd_ahead: reference.qdd,
+            setpoint: &setpoint,
+            mean_qd: wanted,
             lead: 0.0,
             period: 1e-3,
             elapsed: 1e-3,
-            excess: Vector4::zeros(),
+            excess: &Vector4::zeros(),
         };
-        let trig = Trig::new(&q);
         let input = ControlInput {
             motion: &motion,
-            task: &Task::new(&ARM.geometry, &trig, &motion),
-            model: &Model::new(&self.body, &trig, &motion),
-            nominal_inertia: &self.body.nominal_inertia,
-            disturbance: &Vector4::zeros(),
+            geometry: &ARM.geometry,
+            body: &self.body,
         };
-        self.selection.torque(&input, &mut Memory::new()).cast()
+        let (torque, _) = self.selection.torque(&input, &mut Memory::new());
+        torque.cast()
     }
 }
 

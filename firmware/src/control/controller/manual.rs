@@ -6,6 +6,8 @@ use protocol::messages::{Cause, Fault, FaultAxis, Operation, Refusal, RefusalRea
 use super::Controller;
 use super::requests::Answer;
 use crate::control::states::State;
+use crate::mechanics::jacobian::Jacobian;
+use crate::mechanics::kinematics::Trig;
 use crate::trajectory::tool_speed;
 
 impl Controller {
@@ -56,10 +58,11 @@ impl Controller {
         self.too_fast = 0;
     }
 
-    /// Judges the velocity of the flange, measured: x, y, z in m/s, yaw in rad/s.
+    /// Judges the velocity of the flange, measured.
     #[inline(never)]
-    pub(super) fn watch_tool(&mut self, velocity: &Vector4<f32>) {
-        let speed = tool_speed::of(velocity);
+    pub(super) fn watch_tool(&mut self, q: &Vector4<f32>, qd: &Vector4<f32>) {
+        let jacobian = Jacobian::new(&self.config.arm.geometry, &Trig::new(q));
+        let speed = tool_speed::of(&jacobian.task_velocity(qd));
         if speed <= tool_speed::LIMIT {
             self.too_fast = 0;
             return;

@@ -8,10 +8,12 @@ use nalgebra::Vector4;
 use protocol::messages::Compensation;
 
 use super::{ControlInput, Gains, Memory, Motion};
+use crate::mechanics::dynamics::lagrange::Couplings;
 
-/// Joint torques.
+/// Joint torques without friction, which [`Selection::torque`](super::Selection::torque) adds.
 pub fn torque(
     input: &ControlInput<'_>,
+    couplings: &Couplings,
     gains: &Gains,
     compensation: Compensation,
     memory: &mut Memory,
@@ -21,28 +23,23 @@ pub fn torque(
     if compensation == Compensation::Integral {
         acceleration += memory.integrate(&motion.position_error(), motion) * gains.integral();
     }
-    realise(input, &acceleration, compensation)
+    realise(input, couplings, &acceleration)
 }
 
 /// Joint accelerations of the reference, corrected by its errors.
 pub(super) fn acceleration(motion: &Motion<'_>, gains: &Gains) -> Vector4<f32> {
-    motion.qdd_ahead
+    motion.setpoint.ahead.qdd
         + motion.velocity_error() * gains.derivative()
         + motion.position_error() * gains.proportional()
 }
 
-/// The torques that give the joints `acceleration` against the modelled forces and, with the observer, the unmodelled
-/// ones.
+/// The torques that give the joints `acceleration` against the modelled forces without friction.
+#[inline(always)]
 pub(super) fn realise(
     input: &ControlInput<'_>,
+    couplings: &Couplings,
     acceleration: &Vector4<f32>,
-    compensation: Compensation,
 ) -> Vector4<f32> {
-    let model = input.model;
-    let torque = &model.mass * acceleration + model.bias + model.gravity + model.friction;
-    if compensation == Compensation::Observer {
-        torque - input.disturbance
-    } else {
-        torque
-    }
+    let ControlInput { motion, body, .. } = input;
+    body.frictionless(couplings, &motion.measured_qd_ahead(), acceleration)
 }

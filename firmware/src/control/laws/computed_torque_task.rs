@@ -8,25 +8,29 @@
 use nalgebra::Vector4;
 use protocol::messages::Compensation;
 
-use super::{ControlInput, Gains, Memory, computed_torque};
+use super::{ControlInput, Gains, Memory, Task, computed_torque};
+use crate::mechanics::dynamics::lagrange::Couplings;
+use crate::mechanics::kinematics::Trig;
 
-/// Joint torques.
+/// Joint torques without friction, which [`Selection::torque`](super::Selection::torque) adds.
 pub fn torque(
     input: &ControlInput<'_>,
+    (trig, couplings): (&Trig, &Couplings),
     gains: &Gains,
     compensation: Compensation,
     memory: &mut Memory,
 ) -> Vector4<f32> {
-    let ControlInput { motion, task, .. } = *input;
+    let motion = input.motion;
+    let ahead = &motion.setpoint.ahead;
+    let task = Task::new(input, trig);
     let mut pull = task.velocity * gains.derivative() + task.position * gains.proportional();
     if compensation == Compensation::Integral {
         pull += memory.integrate(&task.position, motion) * gains.integral();
     }
-    let desired =
-        task.desired.task_velocity(&motion.qdd_ahead) + task.desired.bias(&motion.qd_ahead);
+    let desired = task.desired.task_velocity(&ahead.qdd) + task.desired.bias(&ahead.qd);
     let carried = task.actual.bias(&motion.measured_qd_ahead());
     let acceleration = task.joint_space(&(desired - carried + pull), || {
         computed_torque::acceleration(motion, gains)
     });
-    computed_torque::realise(input, &acceleration, compensation)
+    computed_torque::realise(input, couplings, &acceleration)
 }

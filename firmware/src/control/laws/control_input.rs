@@ -1,30 +1,24 @@
-//! Input of a law in one sample: the motion, and the kinematics and dynamics evaluated for it.
-//!
-//! All of it is computed before the law is called, whichever law that is. So a law is a few lines of algebra, and a
-//! sample takes about as long with any law.
+//! Input of a law in one sample: the motion, and what all laws and the observer need of kinematics and dynamics.
 
 use nalgebra::Vector4;
 
 use crate::mechanics::arm::Geometry;
-use crate::mechanics::body::{Body, MassMatrix};
+use crate::mechanics::body::Body;
+use crate::mechanics::dynamics::lagrange::Couplings;
 use crate::mechanics::jacobian::Jacobian;
 use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::wrap;
-use crate::trajectory::Reference;
+use crate::trajectory::Setpoint;
 
 /// Everything that a law may use.
 #[derive(Clone, Copy, Debug)]
 pub struct ControlInput<'a> {
     /// Motion in joint space, measured and desired.
     pub motion: &'a Motion<'a>,
-    /// The same in task space.
-    pub task: &'a Task,
-    /// The equations of motion at the measured position.
-    pub model: &'a Model,
-    /// Inertia of each axis by itself, for laws without a model.
-    pub nominal_inertia: &'a Vector4<f32>,
-    /// Efforts that the model does not explain, by the [observer](super::observer): N m, N m, N, N m.
-    pub disturbance: &'a Vector4<f32>,
+    /// Lengths of the arm.
+    pub geometry: &'a Geometry,
+    /// Dynamics of the arm with its payload.
+    pub body: &'a Body,
 }
 
 /// Motion in joint space: shoulder, elbow, lift (positive down), wrist in rad, rad, m, rad and their derivatives in time;
@@ -37,14 +31,10 @@ pub struct Motion<'a> {
     pub qd: Vector4<f32>,
     /// Measured efforts at the joints, means over the last sample: what the motors gave, friction included.
     pub torque: Vector4<f32>,
-    /// Reference at the sampling instant.
-    pub reference: &'a Reference,
+    /// What to follow, at the sampling instant and at the middle of the time in which the command will act.
+    pub setpoint: &'a Setpoint,
     /// Reference velocity through the same filter as `qd`, so that the two compare without a delay.
     pub mean_qd: Vector4<f32>,
-    /// Reference velocity at the middle of the time in which the command will act.
-    pub qd_ahead: Vector4<f32>,
-    /// Reference acceleration then.
-    pub qdd_ahead: Vector4<f32>,
     /// From the sampling instant to the middle of that time, s.
     pub lead: f32,
     /// Sampling period, s.
@@ -52,18 +42,18 @@ pub struct Motion<'a> {
     /// Time since the last sample that has arrived, s.
     pub elapsed: f32,
     /// What the limits cut off the efforts of the last sample; 0 where nothing was cut.
-    pub excess: Vector4<f32>,
+    pub excess: &'a Vector4<f32>,
 }
 
 impl Motion<'_> {
     /// Position error at the sampling instant.
     pub fn position_error(&self) -> Vector4<f32> {
-        self.reference.q - self.q
+        self.setpoint.reference.q - self.q
     }
 
     /// Measured velocity, extrapolated by the change of the reference in the meantime.
     pub fn measured_qd_ahead(&self) -> Vector4<f32> {
-        self.qd + (self.qd_ahead - self.mean_qd)
+        self.qd + (self.setpoint.ahead.qd - self.mean_qd)
     }
 
     /// Velocity error over the last sample.
@@ -86,10 +76,14 @@ pub struct Task {
 }
 
 impl Task {
-    /// Task space of an arm of this geometry at the measured position of `trig`.
-    pub fn new(geometry: &Geometry, trig: &Trig, motion: &Motion<'_>) -> Self {
-        let desired = Jacobian::new(geometry, &Trig::in_line(&motion.reference.q));
-        let actual = Jacobian::new(geometry, trig);
+    /// Task space of a motion, of which there are the sines and cosines of elbow and wrist.
+    #[inline(always)]
+    pub fn new(input: &ControlInput<'_>, trig: &Trig) -> Self {
+        let ControlInput {
+            motion, geometry, ..
+        } = *input;
+        let desired = Jacobian::new(geometry, &Trig::in_line(&motion.setpoint.reference.q));
+        let actual = Jacobian::new(geometry, &trig.with_shoulder(motion.q.x));
         let ((x_desired, y_desired), (x, y)) = (desired.position(), actual.position());
         // Height and yaw are linear in the joints, and so are their errors.
         let joint = motion.position_error();
@@ -120,36 +114,17 @@ impl Task {
             let joint = joint();
             joint + actual.joint_speed_damped(&(task - actual.task_velocity(&joint)))
         } else {
-            actual.joint_speed_damped(task)
+            actual.joint_speed_undamped(task)
         }
     }
 }
 
-/// The terms of M(q) qdd + C qd + g + friction = tau in one sample: N m, N m, N, N m.
+/// What laws and observer have in common of M(q) qdd + C qd + g + friction = tau in one sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Model {
-    /// M, rotors included.
-    pub mass: MassMatrix,
-    /// C qd at the reference velocity while the command will act.
-    pub bias: Vector4<f32>,
-    /// g.
-    pub gravity: Vector4<f32>,
+    /// Inertia at the measured position.
+    pub couplings: Couplings,
     /// Friction of the planned motion in the time in which the command will act: that of the measured one would chatter around
-    /// rest.
+    /// rest. N m, N m, N, N m.
     pub friction: Vector4<f32>,
-    /// C^T qd at the measured velocity: the rate of the momentum that no torque causes.
-    pub kinetic_gradient: Vector4<f32>,
-}
-
-impl Model {
-    /// The model at the position of `trig`.
-    pub fn new(body: &Body, trig: &Trig, motion: &Motion<'_>) -> Self {
-        Self {
-            mass: body.mass_matrix(trig),
-            bias: body.lagrange.bias(trig, &motion.measured_qd_ahead()),
-            gravity: body.lagrange.gravity(),
-            friction: body.drive.friction(&motion.qd_ahead),
-            kinetic_gradient: body.lagrange.kinetic_gradient(trig, &motion.qd),
-        }
-    }
 }

@@ -85,7 +85,7 @@ impl Gains {
             ..Payload::NONE
         };
         let body = Body::new(arm, &heaviest);
-        let inertia = body.mass_matrix(&Trig::new(&Vector4::zeros())).diagonal();
+        let inertia = body.own_inertia(&Trig::new(&Vector4::zeros()));
         let count = body.drive.motor_angle_of_counts(&[1; 4]);
         // What each axis gets from its own motor, which turns as much more as it gives less.
         let step = count.component_div(&body.drive.own_torque(&Vector4::repeat(1.0)));

@@ -6,11 +6,17 @@
 
 use nalgebra::Vector4;
 
-use super::{ControlInput, Gains, Memory, kinematic_joint, velocity_loop};
+use super::{ControlInput, Gains, Memory, Task, kinematic_joint, velocity_loop};
+use crate::mechanics::kinematics::Trig;
 
 /// Joint torques of the velocity loop that follows the law's velocities.
-pub fn torque(input: &ControlInput<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
-    let task = input.task;
+pub fn torque(
+    input: &ControlInput<'_>,
+    trig: &Trig,
+    gains: &Gains,
+    memory: &mut Memory,
+) -> Vector4<f32> {
+    let task = Task::new(input, trig);
     let velocity = task.desired.task_velocity(&input.motion.mean_qd)
         + task.position * velocity_loop::outer_gain(gains);
     let command = task.joint_space(&velocity, || kinematic_joint::velocity(input.motion, gains));

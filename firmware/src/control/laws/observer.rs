@@ -9,6 +9,7 @@
 use nalgebra::Vector4;
 
 use super::{Model, Motion};
+use crate::mechanics::body::Body;
 
 /// State of the observer.
 #[derive(Clone, Copy, Debug)]
@@ -55,12 +56,21 @@ impl MomentumObserver {
     ///
     /// The corner is bounded to half a radian per sample, where the discrete filter still behaves like the continuous
     /// one.
-    pub fn update(&mut self, motion: &Motion<'_>, model: &Model, [corner, least]: [f32; 2]) {
+    pub fn update(
+        &mut self,
+        body: &Body,
+        motion: &Motion<'_>,
+        model: &Model,
+        [corner, least]: [f32; 2],
+    ) {
         let period = motion.period;
+        let couplings = &model.couplings;
+        let bias = couplings.bias(&motion.measured_qd_ahead());
+        let kinetic_gradient = couplings.kinetic_gradient(&motion.qd);
         // Velocities are means over a sample and stand for its middle. The inertia is that of its end: half a sample of the
         // change M' qd = C qd + C^T qd takes the momentum back to the middle.
         let momentum =
-            &model.mass * &motion.qd - (model.bias + model.kinetic_gradient) * (0.5 * period);
+            body.inertial(couplings, &motion.qd) - (bias + kinetic_gradient) * (0.5 * period);
         if !self.started {
             self.started = true;
             self.expected = momentum;
@@ -76,8 +86,8 @@ impl MomentumObserver {
         self.friction = [model.friction, last];
         let share = motion.lead / period;
         let friction = last + (before - last) * if share < 1.0 { share } else { 1.0 };
-        let known = model.gravity + friction;
-        self.expected += (torque + model.kinetic_gradient - known + self.residual) * motion.elapsed;
+        let known = body.lagrange.gravity() + friction;
+        self.expected += (torque + kinetic_gradient - known + self.residual) * motion.elapsed;
         let greatest = 0.5 / period;
         let is_slow = corner < least;
         let own = if is_slow { least } else { corner };

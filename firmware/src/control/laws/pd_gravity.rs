@@ -12,5 +12,5 @@ pub fn torque(input: &ControlInput<'_>, gains: &Gains) -> Vector4<f32> {
     let motion = input.motion;
     let acceleration = motion.position_error() * gains.proportional()
         + motion.velocity_error() * gains.derivative();
-    input.nominal_inertia.component_mul(&acceleration) + input.model.gravity
+    input.body.nominal_inertia.component_mul(&acceleration) + input.body.lagrange.gravity()
 }

@@ -13,5 +13,5 @@ pub fn torque(input: &ControlInput<'_>, gains: &Gains, memory: &mut Memory) -> V
     let acceleration = error * gains.proportional()
         + motion.velocity_error() * gains.derivative()
         + integral * gains.integral();
-    input.nominal_inertia.component_mul(&acceleration)
+    input.body.nominal_inertia.component_mul(&acceleration)
 }

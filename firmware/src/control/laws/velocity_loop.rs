@@ -18,7 +18,7 @@ pub(super) fn torque(
     let error = command - input.motion.qd;
     let integral = memory.integrate(&error, input.motion);
     let acceleration = error * gain + integral * (0.25 * gain * gain);
-    input.nominal_inertia.component_mul(&acceleration) + input.model.gravity
+    input.body.nominal_inertia.component_mul(&acceleration) + input.body.lagrange.gravity()
 }
 
 /// Position gain of a kinematic law around this loop, 1/s: a quarter of the inner bandwidth, so

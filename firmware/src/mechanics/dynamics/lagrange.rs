@@ -69,14 +69,45 @@ impl Coupling {
     }
 }
 
-/// The couplings at one position, and their derivatives.
-struct Couplings {
+/// The couplings at one position, and their derivatives (kg m^2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Couplings {
     k12: f32,
     k14: f32,
     k24: f32,
     d12: f32,
     d14: f32,
     d24: f32,
+}
+
+impl Couplings {
+    /// Coriolis and centrifugal efforts C qd (N m, lift N).
+    #[must_use]
+    pub fn bias(&self, qd: &Vector4<f32>) -> Vector4<f32> {
+        joint_efforts(&self.centrifugal(&absolute_rates(qd)), 0.0)
+    }
+
+    /// Gradient of the kinetic energy with respect to q (N m, lift N), which is C^T qd: the rate of the momentum `M qd`
+    /// that no effort causes. Zero for the shoulder, since no inertia depends on it.
+    #[must_use]
+    pub fn kinetic_gradient(&self, qd: &Vector4<f32>) -> Vector4<f32> {
+        let w = absolute_rates(qd);
+        let arms = self.d12 * w.x * w.y;
+        let arm1_tool = self.d14 * w.x * w.z;
+        let arm2_tool = self.d24 * w.y * w.z;
+        Vector4::new(0.0, arms + arm1_tool, 0.0, -(arm1_tool + arm2_tool))
+    }
+
+    /// Centrifugal terms of the three equations in absolute rates (arm 1, arm 2, tool).
+    fn centrifugal(&self, w: &Vector3<f32>) -> Vector3<f32> {
+        let Self { d12, d14, d24, .. } = *self;
+        let squared = w.component_mul(w);
+        Vector3::new(
+            d12 * squared.y + d14 * squared.z,
+            d24 * squared.z - d12 * squared.x,
+            -d14 * squared.x - d24 * squared.y,
+        )
+    }
 }
 
 impl Lagrange {
@@ -129,7 +160,9 @@ impl Lagrange {
         }
     }
 
-    fn couplings(&self, trig: &Trig) -> Couplings {
+    /// What depends on the position.
+    #[must_use]
+    pub fn couplings(&self, trig: &Trig) -> Couplings {
         let (k12, d12) = self.arm1_arm2.at(trig.s2, trig.c2);
         let sin = trig.s2 * trig.c4 - trig.c2 * trig.s4;
         let cos = trig.c2 * trig.c4 + trig.s2 * trig.s4;
@@ -188,47 +221,42 @@ impl Lagrange {
         coriolis
     }
 
-    /// Coriolis and centrifugal efforts C qd (N m, lift N).
-    #[must_use]
-    pub fn bias(&self, trig: &Trig, qd: &Vector4<f32>) -> Vector4<f32> {
-        joint_efforts(
-            &centrifugal(&self.couplings(trig), &absolute_rates(qd)),
-            0.0,
-        )
-    }
-
-    /// Gradient of the kinetic energy with respect to q (N m, lift N), which is C^T qd: the rate of the momentum `M qd`
-    /// that no effort causes. Zero for the shoulder, since no inertia depends on it.
-    #[must_use]
-    pub fn kinetic_gradient(&self, trig: &Trig, qd: &Vector4<f32>) -> Vector4<f32> {
-        let Couplings { d12, d14, d24, .. } = self.couplings(trig);
-        let w = absolute_rates(qd);
-        let arms = d12 * w.x * w.y;
-        let arm1_tool = d14 * w.x * w.z;
-        let arm2_tool = d24 * w.y * w.z;
-        Vector4::new(0.0, arms + arm1_tool, 0.0, -(arm1_tool + arm2_tool))
-    }
-
     /// Efforts that hold the arm at rest against gravity (N m, lift N): the weight on the lift, upwards.
     #[must_use]
     pub fn gravity(&self) -> Vector4<f32> {
         Vector4::new(0.0, 0.0, -self.weight, 0.0)
     }
 
+    /// Coriolis and centrifugal efforts C qd (N m, lift N).
+    #[must_use]
+    pub fn bias(&self, trig: &Trig, qd: &Vector4<f32>) -> Vector4<f32> {
+        self.couplings(trig).bias(qd)
+    }
+
     /// Inverse dynamics: efforts M qdd + C qd + g for joint accelerations `qdd` (N m, lift N).
     #[must_use]
     pub fn inverse(&self, trig: &Trig, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
-        let couplings = self.couplings(trig);
+        self.inverse_with(&self.couplings(trig), qd, qdd)
+    }
+
+    /// Like [`Lagrange::inverse`], for a caller that already has the couplings.
+    #[must_use]
+    pub fn inverse_with(
+        &self,
+        couplings: &Couplings,
+        qd: &Vector4<f32>,
+        qdd: &Vector4<f32>,
+    ) -> Vector4<f32> {
         let planar =
-            self.planar_inertial(&couplings, qdd) + centrifugal(&couplings, &absolute_rates(qd));
+            self.planar_inertial(couplings, qdd) + couplings.centrifugal(&absolute_rates(qd));
         joint_efforts(&planar, self.lift_mass * qdd.z - self.weight)
     }
 
     /// Inertial efforts M qdd (N m, lift N).
     #[must_use]
-    pub fn inertial(&self, trig: &Trig, qdd: &Vector4<f32>) -> Vector4<f32> {
+    pub fn inertial(&self, couplings: &Couplings, qdd: &Vector4<f32>) -> Vector4<f32> {
         joint_efforts(
-            &self.planar_inertial(&self.couplings(trig), qdd),
+            &self.planar_inertial(couplings, qdd),
             self.lift_mass * qdd.z,
         )
     }
@@ -253,7 +281,7 @@ impl Lagrange {
     pub fn forward(&self, trig: &Trig, qd: &Vector4<f32>, tau: &Vector4<f32>) -> Vector4<f32> {
         let couplings = self.couplings(trig);
         let Couplings { k12, k14, k24, .. } = couplings;
-        let f = absolute_efforts(tau) - centrifugal(&couplings, &absolute_rates(qd));
+        let f = absolute_efforts(tau) - couplings.centrifugal(&absolute_rates(qd));
 
         let (l21, l31) = (k12 / self.inertia.x, k14 / self.inertia.x);
         let d2 = self.inertia.y - l21 * k12;
@@ -270,17 +298,6 @@ impl Lagrange {
             (tau.z + self.weight) / self.lift_mass,
         )
     }
-}
-
-/// Centrifugal terms of the three equations in absolute rates (arm 1, arm 2, tool).
-fn centrifugal(couplings: &Couplings, w: &Vector3<f32>) -> Vector3<f32> {
-    let Couplings { d12, d14, d24, .. } = *couplings;
-    let squared = w.component_mul(w);
-    Vector3::new(
-        d12 * squared.y + d14 * squared.z,
-        d24 * squared.z - d12 * squared.x,
-        -d14 * squared.x - d24 * squared.y,
-    )
 }
 
 /// Turning rates of arm 1, arm 2 and tool in frame 0, from joint rates; accelerations alike.

@@ -49,7 +49,8 @@ impl Cycle {
         self.moving += 1.0;
         let friction = body.drive.friction(qd);
         let constant = own(&(weight + friction));
-        let dynamic = own(&(body.frictionless(&Trig::new(q), qd, qdd) - weight));
+        let dynamic =
+            own(&(body.frictionless(&body.lagrange.couplings(&Trig::new(q)), qd, qdd) - weight));
         for axis in 0..4 {
             let (constant, dynamic) = (constant[axis], dynamic[axis]);
             self.constant[axis] += constant * constant;
