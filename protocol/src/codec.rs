@@ -113,8 +113,22 @@ pub fn encode_with<T>(
     counter: u8,
     look: impl FnOnce(&CanFrame) -> T,
 ) -> Result<T, EncodeError> {
-    let info = info_of(message);
-    let mut frame = CanFrame::of(info);
+    // That of every sample by itself, so that the compiler can work out what the table says of it.
+    if matches!(message, Message::Command(_)) {
+        encode_as(&table::COMMAND, message, counter, look)
+    } else {
+        encode_as(info_of(message), message, counter, look)
+    }
+}
+
+#[inline(always)]
+fn encode_as<T>(
+    info: &MessageInfo,
+    message: &Message,
+    counter: u8,
+    look: impl FnOnce(&CanFrame) -> T,
+) -> Result<T, EncodeError> {
+    let mut frame = CanFrame::zeroed(info.id, info.is_fd(), info.len);
     let data = frame.data_mut();
     let body = data
         .get_mut(..info.body_len())
@@ -134,7 +148,23 @@ pub fn encode_with<T>(
 // Out of line: inside a caller's loop, the compiler would set it up even without a frame.
 #[inline(never)]
 pub fn decode(frame: &CanFrame) -> Result<Received, DecodeError> {
+    // As in encoding.
+    if table::FEEDBACK.identifies(frame) {
+        decode_as(&table::FEEDBACK, frame)
+    } else {
+        decode_other(frame)
+    }
+}
+
+// Out of line: most frames are feedback.
+#[inline(never)]
+fn decode_other(frame: &CanFrame) -> Result<Received, DecodeError> {
     let info = table::of_frame(frame).ok_or(DecodeError::UnknownId)?;
+    decode_as(info, frame)
+}
+
+#[inline(always)]
+fn decode_as(info: &MessageInfo, frame: &CanFrame) -> Result<Received, DecodeError> {
     if frame.is_remote() || frame.is_fd() != info.is_fd() {
         return Err(DecodeError::WrongKind);
     }
@@ -198,6 +228,7 @@ fn put<T: Serialize>(value: &T, body: &mut [u8]) -> Option<()> {
 }
 
 /// Writes the message to the beginning of `body`; `None` if it does not fit.
+#[inline(always)]
 fn write(message: &Message, body: &mut [u8]) -> Option<()> {
     fn pack<const LEN: usize, T: Packed<LEN>>(value: &T, body: &mut [u8]) -> Option<()> {
         value.pack(body.first_chunk_mut()?)

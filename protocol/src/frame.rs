@@ -5,8 +5,7 @@
 //! only FD frames switch the bit rate.
 
 use core::fmt;
-
-use crate::schema::MessageInfo;
+use core::hint::black_box;
 
 pub use embedded_can::{ExtendedId, Id, StandardId};
 
@@ -62,16 +61,21 @@ pub enum FrameKind {
 
 /// One frame as on the bus, without the fields that a controller adds (CRC, stuffing, acknowledge).
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-// This order aligns the data to words, so that they are copied by words, and has nothing behind them that is 0 in a new frame: one byte
-// more to be zeroed than 64, and a function does it, in three times as many instructions.
+// This order aligns the data to words, so that they are copied by words.
 #[repr(C)]
 pub struct CanFrame {
     /// Zero past the end of the data, so that derived equality compares frames.
-    buffer: [u8; FD_MAX],
+    buffer: [[u8; 4]; FD_MAX / 4],
     kind: FrameKind,
     /// Data bytes; in a remote frame, the number requested.
     len: u8,
     id: Id,
+}
+
+/// Zeros. The compiler is not to know: it would call a function to set 64 bytes, which takes six times as many instructions.
+#[inline(always)]
+fn blank() -> [[u8; 4]; FD_MAX / 4] {
+    [black_box(0_u32).to_le_bytes(); FD_MAX / 4]
 }
 
 impl CanFrame {
@@ -94,7 +98,7 @@ impl CanFrame {
             id: id.into(),
             kind: FrameKind::Classical { remote: true },
             len: len as u8,
-            buffer: [0; FD_MAX],
+            buffer: blank(),
         })
     }
 
@@ -105,12 +109,12 @@ impl CanFrame {
         Self::with_data(id.into(), FrameKind::Fd { brs, esi: false }, data)
     }
 
-    /// A frame of a message, with zeroed data for the encoder to fill in place. The table has only lengths that its frames can have, which
-    /// it asserts.
+    /// A frame with zeroed data for the encoder to fill in place, of an identifier and a length that are those of a row of the message table:
+    /// it asserts that frames can have them.
     // No `Option`: the frame would be copied out of it, which takes longer than making it.
     #[inline(always)]
-    pub(crate) fn of(info: &MessageInfo) -> Self {
-        let kind = if info.is_fd() {
+    pub(crate) fn zeroed(id: u16, is_fd: bool, len: usize) -> Self {
+        let kind = if is_fd {
             FrameKind::Fd {
                 brs: true,
                 esi: false,
@@ -119,17 +123,18 @@ impl CanFrame {
             FrameKind::Classical { remote: false }
         };
         Self {
-            id: StandardId::new(info.id).unwrap_or(StandardId::MAX).into(),
+            id: StandardId::new(id).unwrap_or(StandardId::MAX).into(),
             kind,
-            len: info.len as u8,
-            buffer: [0; FD_MAX],
+            len: len as u8,
+            buffer: blank(),
         }
     }
 
-    /// The data bytes of [`Self::of`].
+    /// The data bytes of [`Self::zeroed`].
     #[inline(always)]
     pub(crate) fn data_mut(&mut self) -> &mut [u8] {
         self.buffer
+            .as_flattened_mut()
             .get_mut(..usize::from(self.len))
             .unwrap_or_default()
     }
@@ -145,8 +150,11 @@ impl CanFrame {
 
     fn with_data(id: Id, kind: FrameKind, data: &[u8]) -> Option<Self> {
         let len = fd_length(data.len())?;
-        let mut buffer = [0; FD_MAX];
-        buffer.get_mut(..data.len())?.copy_from_slice(data);
+        let mut buffer = blank();
+        buffer
+            .as_flattened_mut()
+            .get_mut(..data.len())?
+            .copy_from_slice(data);
         Some(Self {
             id,
             kind,
@@ -230,13 +238,13 @@ impl CanFrame {
     #[must_use]
     pub fn data(&self) -> &[u8] {
         let len = if self.is_remote() { 0 } else { self.len };
-        self.buffer.get(..usize::from(len)).unwrap_or_default()
+        self.padded().get(..usize::from(len)).unwrap_or_default()
     }
 
     /// Data bytes, followed by zeros.
     #[must_use]
-    pub const fn padded(&self) -> &[u8; FD_MAX] {
-        &self.buffer
+    pub const fn padded(&self) -> &[u8] {
+        self.buffer.as_flattened()
     }
 
     /// Data length code, 0 to 15 (0 to 8 in a classical frame).

@@ -138,7 +138,7 @@ impl MessageInfo {
     /// the most.
     #[must_use]
     pub fn specimen(&self) -> CanFrame {
-        let mut frame = CanFrame::of(self);
+        let mut frame = CanFrame::zeroed(self.id, self.is_fd(), self.len);
         frame.data_mut().fill(0x0F);
         frame
     }
