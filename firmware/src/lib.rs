@@ -25,8 +25,8 @@
 //! counts -> joints      mechanics::dynamics::drive
 //! monitor, state        control::monitor, control::states: may the arm move, must it stop
 //! reference             trajectory::queue: where the arm should be now, and when the command will act
-//! control input         control::laws::control_input: kinematics and dynamics at the measured position
-//! law                   control::laws: joint efforts
+//! law                   control::laws: kinematics and dynamics at the measured position, joint efforts
+//! observer              control::laws::observer: what the model does not explain
 //! limits                control::limits: cut to what the motors can give
 //! ```
 //!

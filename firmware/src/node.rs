@@ -239,6 +239,7 @@ impl Node {
     /// Judges the place of a feedback. As long as there is torque, one whose sample is not new is old whatever its counter says, half a turn
     /// of that late or sent by another node, and must not take the place of the next one. Nor may one from so far ahead that the feedback
     /// would have been missed long before: all that follow would be old.
+    #[inline(always)]
     fn judge(&mut self, feedback: &Feedback, counter: u8) -> Verdict {
         if let Some((last, _)) = self.newest
             && self.controller.state().is_powered()

@@ -1,8 +1,9 @@
 """Bound of the stack of an image, from its machine code: frame sizes along the deepest chain of calls.
 
-    tests/board/stack.py IMAGE [ROOT]
+    tests/board/stack.py IMAGE              of the whole program
+    tests/board/stack.py IMAGE FUNCTION     of one function and what it calls
 
-Sound while every call is direct and no function calls itself; both are checked. One interrupt is added: all have
+Sound while every call is direct and no function calls itself; both are checked. One interrupt is added to the whole program: all have
 the same priority, so none interrupts another. Faults do not return, and what they overwrite is no longer needed.
 """
 
@@ -76,12 +77,26 @@ def deepest(name, frames, calls, path=(), known=None):
     return known[name]
 
 
+def plain(name):
+    """A name without its mangling."""
+    return subprocess.run(["arm-none-eabi-c++filt", name], capture_output=True, text=True).stdout.strip()
+
+
+def symbol(function, frames):
+    """The only symbol of a function like `Controller::step`."""
+    found = [name for name in frames if function.split("::")[-1] in name and f"::{function}::h" in plain(name)]
+    if len(found) != 1:
+        sys.exit(f"stack.py: {len(found)} functions {function}: inlined, renamed, or several")
+    return found[0]
+
+
 def main():
-    image, root = sys.argv[1], (sys.argv[2:] or ["Reset"])[0]
+    image, functions = sys.argv[1], sys.argv[2:]
     frames, calls, indirect = read(image)
+    root, interrupts = (symbol(functions[0], frames), ()) if functions else ("Reset", INTERRUPTS)
     depth, chain = deepest(root, frames, calls)
-    interrupt, handler = max(deepest(name, frames, calls) for name in INTERRUPTS if name in frames)
-    reached, waiting = set(), [root, *INTERRUPTS]
+    interrupt, handler = max((deepest(name, frames, calls) for name in interrupts if name in frames), default=(0, ()))
+    reached, waiting = set(), [root, *interrupts]
     while waiting:
         name = waiting.pop()
         if name not in reached:
@@ -89,10 +104,9 @@ def main():
             waiting.extend(calls.get(name, ()))
     if blind := reached & indirect:
         sys.exit(f"stack.py: calls through a register in {', '.join(sorted(blind))}")
-    print(depth + EXCEPTION_FRAME + interrupt)
+    print(depth + (EXCEPTION_FRAME + interrupt if handler else 0))
     for name in (*chain, *handler):
-        short = subprocess.run(["arm-none-eabi-c++filt", name], capture_output=True, text=True).stdout.strip()
-        print(f"{frames[name]:6} {short}", file=sys.stderr)
+        print(f"{frames[name]:6} {plain(name)}", file=sys.stderr)
 
 
 main()

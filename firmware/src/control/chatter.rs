@@ -8,7 +8,7 @@ use nalgebra::Vector4;
 
 use super::fault::CHATTER_PERCENT;
 use crate::mechanics::arm::Axis;
-use crate::mechanics::math::clamp;
+use crate::mechanics::math::{clamp, least};
 
 /// Samples of a look: two second differences, of which one shows a swing of four or five samples that the looks happen to keep time
 /// with.
@@ -108,8 +108,8 @@ impl Chatter {
         let slopes = slopes.component_mul(rise) / (period * (KEPT - 1) as f32);
         self.slopes += (slopes.map(|slope| clamp(slope, 0.0, MOST)) - self.slopes) / LOOKS;
         let swings = swings.component_div(limit);
-        let sum = swings.sum() * (SHORT / period).min(1.0);
-        self.mean += (sum.min(MOST) - self.mean) / LOOKS;
+        let sum = swings.sum() * least(SHORT / period, 1.0);
+        self.mean += (least(sum, MOST) - self.mean) / LOOKS;
         let steepest = self.slopes.max() * STEEP;
         let (share, shares) = if steepest > self.mean {
             (steepest, &self.slopes)

@@ -59,15 +59,6 @@ pub struct Config {
     pub setup: Setup,
 }
 
-/// The part of the configuration that never changes.
-#[derive(Clone, Copy, Debug)]
-struct Fixed {
-    arm: ArmModel,
-    period: Period,
-    /// Least corner of the observer, by which the arm is watched, rad/s.
-    least_corner: f32,
-}
-
 impl Config {
     /// Bench settings for `arm`: computed torque with observer, sampled every `period`, on a bus of the default bit timing.
     pub fn new(arm: ArmModel, period: Period) -> Self {
@@ -89,11 +80,14 @@ pub struct Actions {
 }
 
 /// The controller of one arm.
-// The order keeps everything that a sample reads within reach of one base register; the queue alone exceeds that reach.
+// The order keeps everything that every sample reads and writes within reach of one base register; the queue alone exceeds that reach.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Controller {
-    config: Fixed,
+    /// Sampling period, s; fixed, like the arm.
+    period: f32,
+    /// Least corner of the observer, by which the arm is watched, rad/s.
+    least_corner: f32,
     setup: Setup,
     body: Body,
     state: State,
@@ -137,6 +131,7 @@ pub struct Controller {
     error: Vector4<f32>,
     /// Velocities measured in the last sample.
     last_qd: Vector4<f32>,
+    arm: ArmModel,
     replies: Deque<MotionReply, { 2 * CAPACITY }>,
     unanswered: u16,
     queue: MoveQueue,
@@ -151,11 +146,9 @@ impl Controller {
         Self {
             // Of a model that has passed the self-test.
             body: Body::default(),
-            config: Fixed {
-                arm: config.arm,
-                period: config.period,
-                least_corner: Parameter::Observer.initial(config.period.seconds()),
-            },
+            arm: config.arm,
+            period: config.period.seconds(),
+            least_corner: Parameter::Observer.initial(config.period.seconds()),
             setup: config.setup,
             state: State::SelfTest,
             max_gap: config.setup.monitor.gap_samples(config.period.seconds()),
@@ -232,9 +225,9 @@ impl Controller {
             self.let_go();
             return self.torque_off();
         }
-        let period = self.config.period.seconds();
+        let period = self.period;
         let lead = self.setup.command_delay + 0.5 * period;
-        let before = self.setpoint.reference;
+        let before = begun(&self.setpoint.reference, period);
         self.advance(readings.steps.min(self.max_gap), lead);
         if self.state.is_braking() || readings.steps > self.max_gap {
             // The brake holds: the load it carries must not be mistaken for a disturbance. Nor what has not been seen.
@@ -243,35 +236,39 @@ impl Controller {
         let reference = &self.setpoint.reference;
         self.error = reference.q - q;
 
+        let mean_qd = mean_velocity(&before, reference, readings.steps, period);
         let motion = Motion {
             q,
             qd,
             torque: measured_torque,
             setpoint: &self.setpoint,
-            mean_qd: mean_velocity(&before, reference, readings.steps, period),
+            mean_qd,
+            qd_ahead: qd + (self.setpoint.ahead.qd - mean_qd),
             lead,
             period,
             elapsed: period * readings.steps as f32,
+            error: &self.error,
             excess: &self.excess,
         };
         let mut selection = &self.setup.selection;
-        let holding = Selection {
-            law: Law::PdGravity,
-            ..*selection
-        };
+        let axis_by_axis;
         if self.limp {
-            // Axis by axis: what the arm's encoders show must not reach the shaft.
-            selection = &holding;
+            // What the arm's encoders show must not reach the shaft.
+            axis_by_axis = Selection {
+                law: Law::PdGravity,
+                ..*selection
+            };
+            selection = &axis_by_axis;
         }
         let input = ControlInput {
             motion: &motion,
-            geometry: &self.config.arm.geometry,
+            geometry: &self.arm.geometry,
             body: &self.body,
         };
         probe.end(Phase::Reference);
         let (mut torque, model) = selection.torque(&input, &mut self.memory);
         probe.end(Phase::Law);
-        let corners = [selection.gains.observer, self.config.least_corner];
+        let corners = [selection.gains.observer, self.least_corner];
         self.observer.update(&self.body, &motion, &model, corners);
         let felt = self.observer.residual();
         if let Some(axis) = self.monitor.feels(felt)
@@ -286,10 +283,10 @@ impl Controller {
         if self.limp {
             torque = of_shaft(torque);
         } else if selection.compensation == Compensation::Observer {
-            torque -= self.observer.for_law(corners);
+            torque -= self.observer.for_law();
         }
         probe.end(Phase::Observer);
-        let limited = limits::cut(&self.config.arm, &self.body.drive, &torque);
+        let limited = limits::cut(&self.arm, &self.body.drive, &torque);
         self.excess = limited.excess;
         self.last_qd = qd;
         if limited.flags != LimitFlags::EMPTY {
@@ -324,7 +321,7 @@ impl Controller {
             return torque;
         }
         let share = self.built_up;
-        self.built_up += 2.0 * self.config.period.seconds() / self.setup.brake_delay;
+        self.built_up += 2.0 * self.period / self.setup.brake_delay;
         torque * share
     }
 
@@ -356,9 +353,10 @@ fn of_shaft(torque: Vector4<f32>) -> Vector4<f32> {
     Vector4::new(0.0, 0.0, torque.z, torque.w)
 }
 
-/// Mean velocity over the sample that ends at `reference`, exact for constant jerk since the reference `before`.
+/// Mean velocity over the sample that ends at `reference`, exact for constant jerk since the one before, of which `before` is the
+/// [part](begun).
 fn mean_velocity(
-    before: &Reference,
+    before: &Vector4<f32>,
     reference: &Reference,
     steps: u32,
     period: f32,
@@ -367,5 +365,10 @@ fn mean_velocity(
         // That reference is older than the sample.
         return reference.qd - reference.qdd * (0.5 * period);
     }
-    0.5 * (before.qd + reference.qd) + (before.qdd - reference.qdd) * (period / 12.0)
+    before + (0.5 * reference.qd - reference.qdd * (period / 12.0))
+}
+
+/// What a reference contributes to the mean velocity over the sample that begins with it.
+fn begun(reference: &Reference, period: f32) -> Vector4<f32> {
+    0.5 * reference.qd + reference.qdd * (period / 12.0)
 }

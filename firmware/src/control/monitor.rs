@@ -158,15 +158,14 @@ impl Monitor {
         qd: &Vector4<f32>,
         [error, before, last_qd]: [&Vector4<f32>; 3],
     ) -> Option<Fault> {
-        let following = first_beyond(error, &self.following_error);
-        let speed = first_beyond(qd, &self.speed);
-        let range = first_beyond(&(q - self.middle), &self.reach);
-        if following.is_none() && speed.is_none() && range.is_none() {
+        if is_within(error, &self.following_error)
+            && is_within(qd, &self.speed)
+            && is_within(&(q - self.middle), &self.reach)
+        {
             (self.following_count, self.speed_count, self.range_count) = (0, 0, 0);
             return None;
         }
-        let numbers = [q, qd, error, before, last_qd];
-        self.trip(readings, numbers, [following, speed, range])
+        self.trip(readings, [q, qd, error, before, last_qd])
     }
 
     /// Judges the axes of the shaft alone, by the same error, where the others are without torque.
@@ -190,8 +189,9 @@ impl Monitor {
         &mut self,
         readings: &Readings,
         [q, qd, error, before, last_qd]: [&Vector4<f32>; 5],
-        [following, speed, range]: [Option<Axis>; 3],
     ) -> Option<Fault> {
+        let speed = first_beyond(qd, &self.speed);
+        let range = first_beyond(&(q - self.middle), &self.reach);
         // A jump shows as a speed beyond its limit, if not as a following error.
         let jump = self.jump * readings.steps as f32;
         let moved = error - before;
@@ -204,7 +204,7 @@ impl Monitor {
             self.velocity = readings.velocity;
         }
         let needed = self.needed;
-        let following = following.and(most_beyond(error, &self.following_error));
+        let following = most_beyond(error, &self.following_error);
         let following = count(&mut self.following_count, following, needed).map(|axis| {
             let cause = self.why_not_following(readings, axis, axis.of(qd) * axis.of(error));
             of_axis(cause, axis, error, &self.following_error)
@@ -234,11 +234,11 @@ impl Monitor {
 
     /// The first axis with an effort that the model does not explain, of those that it need not.
     pub fn feels(&mut self, disturbance: &Vector4<f32>) -> Option<Axis> {
-        let axis = first_beyond(disturbance, &self.collision);
-        if axis.is_none() {
+        if is_within(disturbance, &self.collision) {
             self.collision_count = 0;
+            return None;
         }
-        axis
+        first_beyond(disturbance, &self.collision)
     }
 
     /// Judges what an axis feels. An arm that has met something feels it, and so does one whose encoder does not show where it is: then it is
@@ -317,14 +317,18 @@ impl Monitor {
     }
 }
 
+/// Whether no axis is beyond its limit; NaN is beyond every one.
+fn is_within(value: &Vector4<f32>, limit: &Vector4<f32>) -> bool {
+    // The bits of magnitudes compare like integers.
+    let beyond = |(value, limit): (&f32, &f32)| value.abs().to_bits() > limit.to_bits();
+    !value.iter().zip(limit.iter()).any(beyond)
+}
+
+// Out of line: rarely reached in a sample.
+#[inline(never)]
 fn first_beyond(value: &Vector4<f32>, limit: &Vector4<f32>) -> Option<Axis> {
-    Axis::ALL
-        .into_iter()
-        .zip(value.iter())
-        .zip(limit.iter())
-        // The bits of magnitudes compare like integers, and NaN is beyond every limit.
-        .find(|((_, value), limit)| value.abs().to_bits() > limit.to_bits())
-        .map(|((axis, _), _)| axis)
+    let beyond = |axis: &Axis| axis.of(value).abs().to_bits() > axis.of(limit).to_bits();
+    Axis::ALL.into_iter().find(beyond)
 }
 
 /// The axis that is farthest beyond its limit: the lift is measured through the wrist, and a faulty axis shakes the others.

@@ -191,6 +191,12 @@ pub fn least(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
+/// The greater of two numbers, likewise; `b` if either is NaN.
+#[must_use]
+pub fn greatest(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 /// `x` limited to [`lower`, `upper`]; NaN stays NaN.
 ///
 /// Unlike `f32::clamp` it does not panic for crossed limits (the lower one wins), and unlike `f32::min` and `max` it is

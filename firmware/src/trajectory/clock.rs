@@ -3,7 +3,7 @@
 
 use super::Rates;
 use super::torque_budget::Ramp;
-use crate::mechanics::math::{clamp, sqrt};
+use crate::mechanics::math::{clamp, greatest, sqrt};
 
 /// Trajectory time in whole samples plus a fraction, so that long moves keep their resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,7 +125,7 @@ impl Clock {
 
     /// The velocities and accelerations of the trajectory as the clock runs through them, `later` seconds from now.
     pub fn apply(&self, rates: &Rates, later: f32) -> Rates {
-        let scale = (self.time_scale + self.slope * later).max(0.0);
+        let scale = greatest(self.time_scale + self.slope * later, 0.0);
         Rates {
             qd: rates.qd * scale,
             qdd: rates.qdd * (scale * scale) + rates.qd * self.slope,
@@ -134,6 +134,6 @@ impl Clock {
 
     /// Time that passes on the trajectory in the next `later` seconds.
     pub fn lead(&self, later: f32) -> f32 {
-        ((self.time_scale + 0.5 * self.slope * later) * later).max(0.0)
+        greatest((self.time_scale + 0.5 * self.slope * later) * later, 0.0)
     }
 }

@@ -69,9 +69,11 @@ impl Controller {
             torque: Vector4::zeros(),
             setpoint: &setpoint,
             mean_qd: wanted,
+            qd_ahead: qd.cast(),
             lead: 0.0,
             period: 1e-3,
             elapsed: 1e-3,
+            error: &(setpoint.reference.q - q),
             excess: &Vector4::zeros(),
         };
         let input = ControlInput {

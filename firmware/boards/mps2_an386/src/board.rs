@@ -57,6 +57,8 @@ fn main() -> ! {
     host::exit(start(SETUP, NODE, REPLY))
 }
 
+// Inlined: what `main` keeps lies below the deepest call.
+#[inline(always)]
 fn start(
     setup: &mut MaybeUninit<Setup>,
     node: &mut MaybeUninit<Node>,

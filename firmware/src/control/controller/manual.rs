@@ -32,7 +32,7 @@ impl Controller {
                 return Err(Refusal::because(RefusalReason::WrongState));
             }
             State::Enabled | State::Moving => {
-                self.held = (self.setup.hold_time / self.config.period.seconds() + 0.5) as u16;
+                self.held = (self.setup.hold_time / self.period + 0.5) as u16;
                 self.queue.set_held(Some(true));
             }
             // It comes to rest first.
@@ -61,7 +61,7 @@ impl Controller {
     /// Judges the velocity of the flange, measured.
     #[inline(never)]
     pub(super) fn watch_tool(&mut self, q: &Vector4<f32>, qd: &Vector4<f32>) {
-        let jacobian = Jacobian::new(&self.config.arm.geometry, &Trig::new(q));
+        let jacobian = Jacobian::new(&self.arm.geometry, &Trig::new(q));
         let speed = tool_speed::of(&jacobian.task_velocity(qd));
         if speed <= tool_speed::LIMIT {
             self.too_fast = 0;
@@ -80,7 +80,7 @@ impl Controller {
     // Out of line: rare.
     #[inline(never)]
     pub(super) fn is_freed(&self, q: &Vector4<f32>) -> bool {
-        let limits = &self.config.arm.limits;
+        let limits = &self.arm.limits;
         let qd = &self.setpoint.reference.qd;
         let inward = |((q, qd), (lower, upper)): ((&f32, &f32), (&f32, &f32))| {
             !(q > upper && *qd > 0.0 || q < lower && *qd < 0.0)

@@ -28,7 +28,7 @@ impl Controller {
             return false;
         }
         let budget = TorqueBudget {
-            arm: &self.config.arm,
+            arm: &self.arm,
             body: &self.body,
         };
         for _ in 0..self.planning_steps {
@@ -57,12 +57,12 @@ impl Controller {
         }
         let stopping = self.state.is_stopping();
         let budget = TorqueBudget {
-            arm: &self.config.arm,
+            arm: &self.arm,
             body: &self.body,
         };
         let stride = Stride {
             steps,
-            period: self.config.period.seconds(),
+            period: self.period,
             lead,
             stopping,
         };

@@ -12,7 +12,7 @@ impl Store for Controller {
     type Parameter = Parameter;
 
     fn period(&self) -> f32 {
-        self.config.period.seconds()
+        self.period
     }
 
     fn is_at_rest(&self) -> bool {
@@ -26,7 +26,7 @@ impl Store for Controller {
         let monitor = &mut setup.monitor;
         Field::Real(match parameter {
             Parameter::SamplingPeriod => {
-                return Field::Reading(self.config.period.seconds());
+                return Field::Reading(self.period);
             }
             Parameter::PayloadMass => return Field::Reading(setup.payload.mass),
             Parameter::Bandwidth => &mut gains.bandwidth,
@@ -108,9 +108,9 @@ impl Store for Controller {
             }
             _ => {
                 let limits = &self.setup.monitor;
-                let period = self.config.period.seconds();
+                let period = self.period;
                 self.max_gap = limits.gap_samples(period);
-                self.monitor.adopt(&self.config.arm, limits, period);
+                self.monitor.adopt(&self.arm, limits, period);
             }
         }
     }

@@ -38,7 +38,7 @@ impl Controller {
 
     /// The robot.
     pub fn arm(&self) -> &ArmModel {
-        &self.config.arm
+        &self.arm
     }
 
     /// Law, compensation and gains in use.

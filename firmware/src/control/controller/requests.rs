@@ -83,12 +83,11 @@ impl Controller {
                     com: (*com).into(),
                     inertia: (*inertia).into(),
                 };
-                self.config
-                    .arm
+                self.arm
                     .validate_payload(&payload)
                     .map_err(payload_refusal)?;
                 self.setup.payload = payload;
-                self.body = Body::new(&self.config.arm, &self.setup.payload);
+                self.body = Body::new(&self.arm, &self.setup.payload);
                 self.burden = Burden::new();
                 self.forget();
                 Answer::Now
@@ -121,7 +120,7 @@ impl Controller {
 
     /// Uses this law with these gains from the next sample on.
     fn select(&mut self, selection: Selection) -> Result<Answer, Refusal> {
-        selection.check(self.config.period.seconds(), self.setup.command_delay)?;
+        selection.check(self.period, self.setup.command_delay)?;
         self.setup.selection = selection;
         self.forget();
         Ok(Answer::Now)

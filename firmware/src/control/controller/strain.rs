@@ -50,9 +50,9 @@ impl Controller {
     // Out of line: rare in a sample.
     #[inline(never)]
     pub(super) fn strain(&mut self, readings: &Readings, qd: &Vector4<f32>) {
-        let period = self.config.period.seconds();
+        let period = self.period;
         let excess = self.excess;
-        let slow = self.config.arm.limits.velocity * SLOW;
+        let slow = self.arm.limits.velocity * SLOW;
         let at_limit = |axis: &Axis| axis.of(&excess) != 0.0;
         let off = self.setup.monitor.following_error * STUCK_ERROR;
         let is_off = |axis: &Axis| axis.of(&self.error).abs() > axis.of(&off);
@@ -72,7 +72,7 @@ impl Controller {
             }
             _ => self.stuck = 0,
         }
-        let rise = self.config.arm.limits.effort_rise_time / period;
+        let rise = self.arm.limits.effort_rise_time / period;
         if let Some(axis) = self.chatter.cut(&excess, &rise) {
             let limit = f32::from(CHATTER_PERCENT);
             self.blame(axis, Fault::value(Cause::Chatter, FULL_SWING, limit));
@@ -92,16 +92,16 @@ impl Controller {
     /// that begin from now on, and what that does not cool stops the arm. Weighs what the lift carries.
     /// It stands for `samples` samples.
     pub fn tend(&mut self, samples: u32) {
-        let period = self.config.period.seconds();
-        let limit = &self.config.arm.drive.motor_torque_limit;
-        let rise = &self.config.arm.limits.effort_rise_time;
+        let period = self.period;
+        let limit = &self.arm.drive.motor_torque_limit;
+        let rise = &self.arm.limits.effort_rise_time;
         if let Some((axis, percent)) = self.chatter.look(limit, rise, period) {
             let limit = f32::from(CHATTER_PERCENT);
             self.blame(axis, Fault::value(Cause::Chatter, percent, limit));
         }
         let part = samples as f32 * period / self.setup.thermal_time;
         // Of each motor by itself.
-        let continuous = (self.config.arm.limits.effort_continuous)
+        let continuous = (self.arm.limits.effort_continuous)
             .component_div(&self.body.drive.own_torque(&Vector4::repeat(1.0)));
         let torques = self.chatter.torques();
         let (axis, heat) = self.heat.account(torques, &continuous, part);
@@ -116,7 +116,7 @@ impl Controller {
         self.queue.set_cool_pace(pace);
         if self.state.is_powered() && !self.state.is_braking() {
             let time = samples as f32 * period;
-            let gravity = self.config.arm.gravity;
+            let gravity = self.arm.gravity;
             let heavier = 1.0 - self.setpoint.reference.qdd.z / gravity;
             let pull = self.observer.residual().z;
             self.burden.account(pull, gravity, heavier, time);

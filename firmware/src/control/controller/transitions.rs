@@ -17,7 +17,7 @@ impl Controller {
             return false;
         };
         if event == Event::SelfTestPassed {
-            self.body = Body::new(&self.config.arm, &self.setup.payload);
+            self.body = Body::new(&self.arm, &self.setup.payload);
         }
         self.enter(next);
         true
@@ -77,7 +77,7 @@ impl Controller {
     #[inline(never)]
     pub(super) fn bridge(&mut self, steps: u32) {
         if steps > self.max_gap {
-            let gap = steps as f32 * self.config.period.seconds() * 1e3;
+            let gap = steps as f32 * self.period * 1e3;
             let fault = Fault::value(Cause::FeedbackLost, gap, self.setup.monitor.gap * 1e3);
             self.fail(fault);
         } else if self.state.is_powered() {
@@ -106,7 +106,7 @@ impl Controller {
             return;
         }
         // The reference of the last sample: at most one sample of motion older than `q`.
-        let moved = self.setpoint.reference.qd * self.config.period.seconds();
+        let moved = self.setpoint.reference.qd * self.period;
         let numbers = [&(error + moved), &self.error, &self.last_qd];
         if let Some(fault) = self.monitor.check(readings, q, qd, numbers)
             && !(fault.cause == Cause::SoftLimit && self.is_freed(q))
@@ -181,7 +181,7 @@ impl Controller {
 
     /// Time of the brake, samples.
     fn brake_samples(&self) -> u32 {
-        (self.setup.brake_delay / self.config.period.seconds()) as u32 + 1
+        (self.setup.brake_delay / self.period) as u32 + 1
     }
 
     /// The control word for drives and pins now: unlike the last command sent, it includes what has happened since that

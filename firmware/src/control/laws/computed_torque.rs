@@ -21,7 +21,7 @@ pub fn torque(
     let motion = input.motion;
     let mut acceleration = acceleration(motion, gains);
     if compensation == Compensation::Integral {
-        acceleration += memory.integrate(&motion.position_error(), motion) * gains.integral();
+        acceleration += memory.integrate(motion.error, motion) * gains.integral();
     }
     realise(input, couplings, &acceleration)
 }
@@ -30,7 +30,7 @@ pub fn torque(
 pub(super) fn acceleration(motion: &Motion<'_>, gains: &Gains) -> Vector4<f32> {
     motion.setpoint.ahead.qdd
         + motion.velocity_error() * gains.derivative()
-        + motion.position_error() * gains.proportional()
+        + motion.error * gains.proportional()
 }
 
 /// The torques that give the joints `acceleration` against the modelled forces without friction.
@@ -41,5 +41,5 @@ pub(super) fn realise(
     acceleration: &Vector4<f32>,
 ) -> Vector4<f32> {
     let ControlInput { motion, body, .. } = input;
-    body.frictionless(couplings, &motion.measured_qd_ahead(), acceleration)
+    body.frictionless(couplings, &motion.qd_ahead, acceleration)
 }

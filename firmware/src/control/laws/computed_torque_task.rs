@@ -28,7 +28,7 @@ pub fn torque(
         pull += memory.integrate(&task.position, motion) * gains.integral();
     }
     let desired = task.desired.task_velocity(&ahead.qdd) + task.desired.bias(&ahead.qd);
-    let carried = task.actual.bias(&motion.measured_qd_ahead());
+    let carried = task.actual.bias(&motion.qd_ahead);
     let acceleration = task.joint_space(&(desired - carried + pull), || {
         computed_torque::acceleration(motion, gains)
     });

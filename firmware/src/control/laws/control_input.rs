@@ -35,27 +35,21 @@ pub struct Motion<'a> {
     pub setpoint: &'a Setpoint,
     /// Reference velocity through the same filter as `qd`, so that the two compare without a delay.
     pub mean_qd: Vector4<f32>,
+    /// Measured velocities, extrapolated to that time by the change of the reference in the meantime.
+    pub qd_ahead: Vector4<f32>,
     /// From the sampling instant to the middle of that time, s.
     pub lead: f32,
     /// Sampling period, s.
     pub period: f32,
     /// Time since the last sample that has arrived, s.
     pub elapsed: f32,
+    /// Position error at the sampling instant, reference minus measured.
+    pub error: &'a Vector4<f32>,
     /// What the limits cut off the efforts of the last sample; 0 where nothing was cut.
     pub excess: &'a Vector4<f32>,
 }
 
 impl Motion<'_> {
-    /// Position error at the sampling instant.
-    pub fn position_error(&self) -> Vector4<f32> {
-        self.setpoint.reference.q - self.q
-    }
-
-    /// Measured velocity, extrapolated by the change of the reference in the meantime.
-    pub fn measured_qd_ahead(&self) -> Vector4<f32> {
-        self.qd + (self.setpoint.ahead.qd - self.mean_qd)
-    }
-
     /// Velocity error over the last sample.
     pub fn velocity_error(&self) -> Vector4<f32> {
         self.mean_qd - self.qd
@@ -86,7 +80,7 @@ impl Task {
         let actual = Jacobian::new(geometry, &trig.with_shoulder(motion.q.x));
         let ((x_desired, y_desired), (x, y)) = (desired.position(), actual.position());
         // Height and yaw are linear in the joints, and so are their errors.
-        let joint = motion.position_error();
+        let joint = motion.error;
         Self {
             position: Vector4::new(
                 x_desired - x,

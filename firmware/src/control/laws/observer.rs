@@ -20,8 +20,8 @@ pub struct MomentumObserver {
     previous_torque: Vector4<f32>,
     /// Friction that the laws counted with in the last sample, and in the one before.
     friction: [Vector4<f32>; 2],
-    /// What a law with a corner below the least gets.
-    slow: Vector4<f32>,
+    /// What the law gets: the residual, or less of it with a corner below the least.
+    for_law: Vector4<f32>,
     started: bool,
 }
 
@@ -33,7 +33,7 @@ impl MomentumObserver {
             residual: Vector4::zeros(),
             previous_torque: Vector4::zeros(),
             friction: [Vector4::zeros(); 2],
-            slow: Vector4::zeros(),
+            for_law: Vector4::zeros(),
             started: false,
         }
     }
@@ -43,13 +43,9 @@ impl MomentumObserver {
         &self.residual
     }
 
-    /// The same for a law with this corner, of which the residual has `least` or more.
-    pub fn for_law(&self, [corner, least]: [f32; 2]) -> &Vector4<f32> {
-        if corner < least {
-            &self.slow
-        } else {
-            &self.residual
-        }
+    /// The same with the corner of the law, which may be less than that of the residual.
+    pub fn for_law(&self) -> &Vector4<f32> {
+        &self.for_law
     }
 
     /// Estimates the disturbance after one more sample.
@@ -65,12 +61,16 @@ impl MomentumObserver {
     ) {
         let period = motion.period;
         let couplings = &model.couplings;
-        let bias = couplings.bias(&motion.measured_qd_ahead());
+        let bias = couplings.bias(&motion.qd_ahead);
         let kinetic_gradient = couplings.kinetic_gradient(&motion.qd);
         // Velocities are means over a sample and stand for its middle. The inertia is that of its end: half a sample of the
         // change M' qd = C qd + C^T qd takes the momentum back to the middle.
-        let momentum =
-            body.inertial(couplings, &motion.qd) - (bias + kinetic_gradient) * (0.5 * period);
+        let half = 0.5 * period;
+        let mut momentum = body.inertial(couplings, &motion.qd);
+        // The lift has no part in either, and the shoulder none in the second.
+        momentum.x -= bias.x * half;
+        momentum.y -= (bias.y + kinetic_gradient.y) * half;
+        momentum.w -= (bias.w + kinetic_gradient.w) * half;
         if !self.started {
             self.started = true;
             self.expected = momentum;
@@ -86,8 +86,9 @@ impl MomentumObserver {
         self.friction = [model.friction, last];
         let share = motion.lead / period;
         let friction = last + (before - last) * if share < 1.0 { share } else { 1.0 };
-        let known = body.lagrange.gravity() + friction;
-        self.expected += (torque + kinetic_gradient - known + self.residual) * motion.elapsed;
+        let mut unknown = torque + kinetic_gradient - friction;
+        unknown.z -= body.lagrange.gravity().z;
+        self.expected += (unknown + self.residual) * motion.elapsed;
         let greatest = 0.5 / period;
         let is_slow = corner < least;
         let own = if is_slow { least } else { corner };
@@ -96,6 +97,8 @@ impl MomentumObserver {
         self.residual = (momentum - self.expected) * own;
         if is_slow {
             self.filter(&before, corner / own, corner * motion.elapsed);
+        } else {
+            self.for_law = self.residual;
         }
     }
 
@@ -104,7 +107,7 @@ impl MomentumObserver {
     // Out of line: not with the gains that most will have.
     #[inline(never)]
     fn filter(&mut self, before: &Vector4<f32>, share: f32, angle: f32) {
-        self.slow += (self.residual - before) * share + (before - self.slow) * angle;
+        self.for_law += (self.residual - before) * share + (before - self.for_law) * angle;
     }
 }
 

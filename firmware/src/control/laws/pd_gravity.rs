@@ -10,7 +10,7 @@ use super::{ControlInput, Gains};
 /// Joint torques; the gain matrices are nominal inertias times Kp and Kd.
 pub fn torque(input: &ControlInput<'_>, gains: &Gains) -> Vector4<f32> {
     let motion = input.motion;
-    let acceleration = motion.position_error() * gains.proportional()
-        + motion.velocity_error() * gains.derivative();
+    let acceleration =
+        motion.error * gains.proportional() + motion.velocity_error() * gains.derivative();
     input.body.nominal_inertia.component_mul(&acceleration) + input.body.lagrange.gravity()
 }

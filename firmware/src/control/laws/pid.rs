@@ -8,8 +8,8 @@ use super::{ControlInput, Gains, Memory};
 /// Joint torques: nominal inertia times (Kp e + Ki integral e + Kd e').
 pub fn torque(input: &ControlInput<'_>, gains: &Gains, memory: &mut Memory) -> Vector4<f32> {
     let motion = input.motion;
-    let error = motion.position_error();
-    let integral = memory.integrate(&error, motion);
+    let error = motion.error;
+    let integral = memory.integrate(error, motion);
     let acceleration = error * gains.proportional()
         + motion.velocity_error() * gains.derivative()
         + integral * gains.integral();

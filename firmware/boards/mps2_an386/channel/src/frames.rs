@@ -36,8 +36,8 @@ pub(crate) fn write_frame(frame: &CanFrame, record: &mut [u8; FRAME_LEN]) {
         let shape = len as u32 | u32::from(flags) << 8;
         *header = (u64::from(shape) << 32 | u64::from(id)).to_le_bytes();
         // All of it: an unknown number of bytes takes longer.
-        if let Some(place) = data.first_chunk_mut() {
-            *place = *frame.padded();
+        if data.len() == frame.padded().len() {
+            data.copy_from_slice(frame.padded());
         }
     }
 }
