@@ -25,7 +25,13 @@ fn it_is_the_weight_that_is_not_explained() {
 /// Friction of 30 N that the model does not have, in strokes of 0.25 s up and down: a tenth of what it would be in one direction.
 #[test]
 fn friction_is_gone_in_the_mean_of_both_directions() {
-    let friction = |sample: u32| if sample / 25 % 2 == 0 { 30.0 } else { -30.0 };
+    let friction = |sample: u32| {
+        if (sample / 25).is_multiple_of(2) {
+            30.0
+        } else {
+            -30.0
+        }
+    };
     let left = after(10, friction).abs();
     assert!(left < 0.13 * 30.0 / GRAVITY, "{left} kg");
 }

@@ -165,16 +165,16 @@ fn an_axis_that_runs_away_from_its_torque_has_a_wrong_encoder() {
     }
 }
 
-/// Every axis as far as in some samples, within 15 %, forwards or, where the observer begins anew, backwards; up to seven, and faster than 1 %.
+/// Every axis twice as far as in the last sample, within 15 %, forwards or, where the observer begins anew, backwards; and faster than 1 %.
 #[test]
-fn samples_that_are_missing_are_counted() {
+fn a_sample_that_is_missing_is_counted() {
     let speed = IRB_930.limits.velocity;
     let missing = |steps, last: [f32; 4], found: [f32; 4]| {
         let [last, found] = [last, found].map(|it| Vector4::from(it).component_mul(&speed));
         let now = readings(steps, RUN, [0.0; 4]);
         let numbers = [&found, &last, &FORCE, &ERROR, &found];
         match monitor().felt(Axis::Shoulder, &now, numbers) {
-            Felt::Missed(samples) => samples,
+            Felt::Missed => 1,
             Felt::Nothing => 0,
             Felt::Fault(fault) => panic!("{fault}"),
         }
@@ -187,11 +187,8 @@ fn samples_that_are_missing_are_counted() {
         (2.0, 1),
         (2.3, 1),
         (2.4, 0),
-        (3.0, 2),
-        (3.2, 2),
-        (5.0, 4),
-        (7.0, 6),
-        (8.0, 0),
+        (3.0, 0),
+        (5.0, 0),
         (-2.0, 0),
     ] {
         let far = way.map(|part| part * times);
@@ -207,7 +204,7 @@ fn samples_that_are_missing_are_counted() {
     let numbers = [2.0, 1.0].map(|times| Vector4::from(way.map(|part| part * times)));
     let [found, last] = numbers.map(|it| it.component_mul(&speed));
     let numbers = [&found, &last, &FORCE, &ERROR, &found];
-    for (fastest, expected) in [(1999.9, Felt::Missed(1)), (-2000.0, Felt::Nothing)] {
+    for (fastest, expected) in [(1999.9, Felt::Missed), (-2000.0, Felt::Nothing)] {
         let now = readings(1, [0.0, 0.0, fastest, 0.0], [0.0; 4]);
         assert_eq!(monitor().felt(Axis::Shoulder, &now, numbers), expected);
     }
@@ -232,7 +229,7 @@ fn samples_are_missed_at_once_or_not_at_all() {
     let [slow, fast] = &rates;
     let numbers = [fast, slow, &FORCE, &ERROR, fast];
     let one = readings(1, RUN, [0.0; 4]);
-    assert_eq!(monitor.felt(Axis::Shoulder, &one, numbers), Felt::Missed(1));
+    assert_eq!(monitor.felt(Axis::Shoulder, &one, numbers), Felt::Missed);
     let even = [slow, slow, &FORCE, &ERROR, slow];
     assert_eq!(monitor.felt(Axis::Shoulder, &one, even), Felt::Nothing);
     let found = monitor.felt(Axis::Shoulder, &one, numbers);

@@ -111,6 +111,10 @@ pub struct Controller {
     fault: Fault,
     /// Whether only the shaft is under torque until the brake has closed: shoulder or elbow has to be without.
     limp: bool,
+    /// Where the lift is held meanwhile, m; along the path of the stop if it was not at rest.
+    lift_held: Option<f32>,
+    /// Whether the drives have had torque since enabling.
+    drives_on: bool,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
     saturated: u32,
     /// Samples more than the drives have counted that have passed since the last one.
@@ -165,6 +169,8 @@ impl Controller {
             too_fast: 0,
             fault: Fault::NONE,
             limp: false,
+            lift_held: None,
+            drives_on: false,
             alarm: None,
             saturated: 0,
             stuck: 0,
@@ -214,7 +220,7 @@ impl Controller {
         self.watch(readings, &q, &qd);
         self.wait(readings);
         if !self.state.is_powered() {
-            self.watch_brake(readings);
+            self.watch_at_rest(readings, &q);
             // No torque: follow the arm, so that enabling starts at its present position.
             self.setpoint = Setpoint::rest(q);
             self.queue.clear(&q);
@@ -229,6 +235,9 @@ impl Controller {
         let lead = self.setup.command_delay + 0.5 * period;
         let before = begun(&self.setpoint.reference, period);
         self.advance(readings.steps.min(self.max_gap), lead);
+        if self.limp {
+            self.hold_lift();
+        }
         if self.state.is_braking() || readings.steps > self.max_gap {
             // The brake holds: the load it carries must not be mistaken for a disturbance. Nor what has not been seen.
             self.unlearn();

@@ -13,10 +13,8 @@ const SLOW: f32 = 0.01;
 /// Share of the speed at which it was to go on from which on it goes back as a reversed encoder shows it.
 const BACK: f32 = 0.75;
 
-/// Square of the share of its speed that an arm may be off by where the drives have missed a sample, as it speeds up meanwhile; and the most
-/// times as far as in one sample that it may have gone: those that have missed more commands than they hold one for have switched off.
+/// Square of the share of its way that an arm may be off by where the drives have missed a sample, as it speeds up meanwhile.
 const ALIKE: f32 = 0.0225;
-const MOST_TIMES: u32 = 7;
 
 /// What is felt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,8 +23,8 @@ pub enum Felt {
     Nothing,
     /// A fault.
     Fault(Fault),
-    /// So many samples more have passed than the drives have counted.
-    Missed(u32),
+    /// One sample more has passed than the drives have counted.
+    Missed,
 }
 
 /// Limits whose violation stops the arm.
@@ -193,12 +191,10 @@ impl Monitor {
         let speed = first_beyond(qd, &self.speed);
         let range = first_beyond(&(q - self.middle), &self.reach);
         // A jump shows as a speed beyond its limit, if not as a following error.
-        let jump = self.jump * readings.steps as f32;
-        let moved = error - before;
-        if let Some(axis) = most_beyond(&moved, &jump)
-            && self.missed(readings, qd, last_qd) == 0
+        if let Some(fault) = self.jumped(&(error - before), readings.steps)
+            && !self.missed(readings, qd, last_qd)
         {
-            return Some(of_axis(Cause::EncoderFault, axis, &moved, &jump));
+            return Some(fault);
         }
         if self.following_count == 0 {
             self.velocity = readings.velocity;
@@ -253,12 +249,8 @@ impl Monitor {
     ) -> Felt {
         if self.collision_count == 0 {
             // Of two in a row, the second is where the observer began anew.
-            let missed = match self.missed(readings, qd, last_qd) {
-                0 => self.missed(readings, last_qd, qd),
-                missed => missed,
-            };
-            if missed > 0 {
-                return Felt::Missed(missed);
+            if self.missed(readings, qd, last_qd) || self.missed(readings, last_qd, qd) {
+                return Felt::Missed;
             }
             (self.velocity_felt, self.wanted) = (readings.velocity, *wanted);
         }
@@ -291,21 +283,22 @@ impl Monitor {
         })
     }
 
-    /// Samples that the drives have left out before this one without counting them, as when their clock has missed a tick: then every axis
-    /// has moved a whole number of times as far as in the last one.
-    fn missed(&self, readings: &Readings, qd: &Vector4<f32>, last_qd: &Vector4<f32>) -> u32 {
+    /// Whether the drives have left out a sample before this one without counting it, as when their clock has missed a tick: then every axis has
+    /// moved twice as far as in the last one. More would look like too many jumps of an encoder.
+    fn missed(&self, readings: &Readings, qd: &Vector4<f32>, last_qd: &Vector4<f32>) -> bool {
         let last = last_qd.component_div(&self.speed);
         let found = qd.component_div(&self.speed);
-        let square = last.dot(&last);
-        let times = (found.dot(&last) / square + 0.5) as u32;
-        let off = found - last * times as f32;
-        let is_alike = square > SLOW * SLOW && off.dot(&off) < ALIKE * found.dot(&found);
-        let has_counted_one = readings.steps == 1 && readings.is_measured();
-        if has_counted_one && is_alike && (2..=MOST_TIMES).contains(&times) {
-            times - 1
-        } else {
-            0
-        }
+        let off = found - last * 2.0;
+        let is_alike = off.dot(&off) < ALIKE * found.dot(&found);
+        let moves = last.dot(&last) > SLOW * SLOW;
+        readings.steps == 1 && readings.is_measured() && moves && is_alike
+    }
+
+    /// An encoder that jumps further in these samples than its axis can move.
+    pub fn jumped(&self, moved: &Vector4<f32>, steps: u32) -> Option<Fault> {
+        let jump = self.jump * steps as f32;
+        let axis = most_beyond(moved, &jump)?;
+        Some(of_axis(Cause::EncoderFault, axis, moved, &jump))
     }
 
     /// Forgets the counts, for a new start.

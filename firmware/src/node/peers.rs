@@ -10,7 +10,6 @@ use protocol::time::{Duration, Instant};
 
 use super::Node;
 use crate::control::fault::{FLOOD, FLOOD_RATE};
-use crate::control::states::State;
 
 /// Feedbacks after a flood in which it is remembered: those of the samples for which drives hold a command, and of the one in which they let go, may
 /// have waited for its end.
@@ -107,11 +106,9 @@ impl Node {
             .fail(Fault::value(Cause::DuplicateNode, id, 0.0));
     }
 
-    /// Whether drives that should have torque have none, as when they have started anew. While the brake opens they may not be on yet.
+    /// Whether drives that should have torque have none, as when they have started anew.
     pub(super) fn has_let_go(&self, status: DriveStatus) -> bool {
-        let state = self.controller.state();
-        let has_torque = state.is_powered() && !matches!(state, State::Enabling(_));
-        has_torque && !status.contains(DriveStatus::TORQUE_ON)
+        self.controller.expects_torque() && !status.contains(DriveStatus::TORQUE_ON)
     }
 
     /// Counts bad feedback frames; several in a row stop the arm. The fault has their number, or what the drives say.

@@ -115,10 +115,12 @@ impl InProcess {
                 self.clock.elapse(now.since(last.unwrap_or(now)));
             }
             Some(frame) => {
-                if table::FEEDBACK.identifies(frame) {
+                let advances = self.clock.observe(frame);
+                // What cannot be read is no reason to let its time stand still.
+                if advances || table::FEEDBACK.identifies(frame) && codec::decode(frame).is_ok() {
                     self.last = Some(now);
                 }
-                if self.clock.observe(frame) {
+                if advances {
                     self.node.poll(self.clock.now(), None, &mut send);
                 }
             }

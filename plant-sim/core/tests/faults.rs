@@ -282,3 +282,28 @@ fn a_window_that_is_empty_at_the_rate_of_the_run_is_refused_by_its_key() {
         assert_eq!(said.is_some(), empty);
     }
 }
+
+/// A drive that is in fault before anything is switched on, and an encoder that jumps then: the arm is not switched on.
+#[test]
+fn an_arm_that_is_not_sound_is_not_switched_on() {
+    for (fault, cause) in [
+        ("motor:wrist:dip@0.01s", "drive-fault"),
+        ("encoder:elbow:jump=0.2@0.02s", "encoder-fault"),
+    ] {
+        let (summary, record) = run(&[fault], 5);
+        assert_eq!(summary.faults[0].cause, cause, "{fault}");
+        assert!(summary.faults[0].time_s < 0.025, "{fault}");
+        let on = record.truths.iter().any(|it| it.plant.tau != [0.0; 4]);
+        assert!(!on || cause == "encoder-fault", "{fault}");
+    }
+}
+
+/// Drives that let go while the brake opens, once they have been on, are told in the next sample.
+#[test]
+fn drives_that_let_go_while_the_brake_opens_are_told() {
+    let (summary, _) = run(&["command:loss@enabling+10ms..+12ms"], 5);
+    let first = &summary.faults[0];
+    assert_eq!(first.cause, "drive-fault");
+    // Enabling begins at 26 ms: five samples after the last command, and one to tell it.
+    assert!(first.time_s < 0.045, "{}", first.time_s);
+}

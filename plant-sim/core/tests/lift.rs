@@ -85,3 +85,34 @@ fn a_lift_whose_brake_is_stuck_open_is_held_when_the_arm_fails() {
         assert!(runaway || pushes.count() == 0, "{fault}");
     }
 }
+
+/// The arm fails while the lift stands at the top of the gate: it is not driven down the path that follows, against its brake or where that is
+/// stuck open.
+#[test]
+fn a_lift_at_rest_stays_where_it_is_when_the_arm_fails() {
+    for brake in [None, Some("brake:stuck-open@0.3s")] {
+        let jump = "encoder:elbow:jump=1@0.45s";
+        let faults: Vec<&str> = brake.into_iter().chain([jump]).collect();
+        let (summary, record) = with_22_kg(&faults);
+        assert!(!summary.completed, "{faults:?}");
+        let after = record.truths.iter().filter(|it| it.plant.t > 0.4495);
+        let places = after.map(|it| it.plant.q[LIFT]);
+        let (highest, lowest) = places.fold((f64::MAX, f64::MIN), |(high, low), place| {
+            (high.min(place), low.max(place))
+        });
+        assert!(
+            lowest - highest < 1e-3,
+            "{faults:?}: {} m",
+            lowest - highest
+        );
+    }
+}
+
+/// An emergency stop whose brake does not close is no reason to keep that to oneself.
+#[test]
+fn a_brake_that_does_not_close_is_told_whatever_was_told_before() {
+    let scenario = Scenario::built_in("estop-descent").unwrap();
+    let (summary, _) = run_of(scenario, &["brake:stuck-open@0s"], 5);
+    let causes: Vec<_> = summary.faults.iter().map(|fault| fault.cause).collect();
+    assert_eq!(causes, ["estop", "drive-fault"]);
+}

@@ -14,7 +14,7 @@ mod record;
 use protocol::messages::Cause;
 use record::{Record, run_of};
 use sim::run::in_process;
-use sim::scenario::{GainsSpec, Scenario};
+use sim::scenario::{GainsSpec, Scenario, built_in};
 use sim::setup::RunConfig;
 use sim::summary::Summary;
 
@@ -185,8 +185,7 @@ fn an_encoder_that_lags_three_milliseconds_is_felt_in_every_cycle() {
     }
 }
 
-/// A tick that the clock of the drives misses is a sample that is bridged, whenever it is; more than a gap in the feedback may
-/// have are told as such a gap, where they can be told from the motion.
+/// A tick that the clock of the drives misses is a sample that is bridged, whenever it is; more look like an encoder that jumps.
 #[test]
 fn a_missed_tick_of_the_clock_is_bridged() {
     for rate in [1000.0, 2000.0] {
@@ -199,13 +198,33 @@ fn a_missed_tick_of_the_clock_is_bridged() {
             }
         }
     }
-    let law = "computed-torque:observer";
-    let told = first(
-        scenario("palletise", 1000.0, law),
-        "clock:misses@0.4s..+5samples",
-        0.4,
-    );
-    assert_eq!(told.unwrap().0, Cause::FeedbackLost.name());
+    for ticks in [3, 5] {
+        let law = "computed-torque:observer";
+        let fault = format!("clock:misses@0.4s..+{ticks}samples");
+        let told = first(scenario("palletise", 1000.0, law), &fault, 0.4);
+        assert_eq!(told.unwrap().0, Cause::EncoderFault.name());
+    }
+}
+
+/// What a jump can be taken for is a sample that is missing: it is believed up to 2.3 times as far as the axis has moved in the last one, of which it has
+/// moved one itself. Anything further is told, or felt and stopped.
+#[test]
+fn an_encoder_that_jumps_by_more_than_a_sample_is_found() {
+    for by in [0.004, 0.006, 0.008, 0.03, -0.005] {
+        for at in 0..30 {
+            let begin = 0.385 + 0.003 * f64::from(at);
+            let descent = [
+                "start=[0.6,0.1,-0.13,0.0]",
+                "cycle=[{line={to=[0.6,0.1,-0.41,0.0]}},{dwell=0.2}]",
+            ];
+            let changes = descent.map(|change| change.parse().unwrap());
+            let text = built_in("gate").unwrap();
+            let mut scenario = Scenario::parse_with(text, "gate", &changes).unwrap();
+            scenario.carry(22.0).unwrap();
+            let fault = format!("encoder:lift:jump={by}@{begin}s");
+            assert!(first(scenario, &fault, begin).is_some(), "{fault}");
+        }
+    }
 }
 
 /// A load that is lost or far heavier than announced is no fault of an encoder: an obstacle at most, or a loop that swings since its

@@ -9,6 +9,10 @@ use crate::control::monitor::{Felt, Monitor};
 use crate::control::readings::Readings;
 use crate::control::states::{Event, Halt, State};
 use crate::mechanics::body::Body;
+use crate::trajectory::{Reference, Setpoint};
+
+/// Speed of the lift, m/s, from which on it cannot be stopped where it is within its following error.
+const SLOW_LIFT: f32 = 0.2;
 
 impl Controller {
     /// Takes the transition of the current state on `event`; returns whether there is one.
@@ -38,6 +42,10 @@ impl Controller {
             // The lift need not fall because an axis of the arm has to be without torque, least of all if its brake is stuck.
             Some(Event::FaultOff) if self.state.is_powered() && is_of_arm(fault.axis) => {
                 let first = !self.limp;
+                if first {
+                    let Reference { q, qd, .. } = self.setpoint.reference;
+                    self.lift_held = (qd.z.abs() < SLOW_LIFT).then_some(q.z);
+                }
                 self.limp = true;
                 self.event(Event::FaultBrake) || first
             }
@@ -54,7 +62,9 @@ impl Controller {
         match next {
             State::Enabling(_) => {
                 self.limp = false;
+                self.drives_on = false;
                 self.built_up = 0.0;
+                self.unheld = 0;
                 self.unlearn();
                 self.monitor.reset();
             }
@@ -90,10 +100,10 @@ impl Controller {
         if !self.state.is_powered() {
             return;
         }
-        // Drives that missed commands have switched off by themselves, and nobody else says so. While the brake opens they may not be
-        // on yet; after too long a gap in the feedback, the stop goes on with them.
-        let has_torque =
-            !matches!(self.state, State::Enabling(_)) && readings.steps <= self.max_gap;
+        // Drives that missed commands have switched off by themselves, and nobody else says so. After too long a gap in the feedback, the
+        // stop goes on with them.
+        self.drives_on |= readings.status.contains(DriveStatus::TORQUE_ON);
+        let has_torque = self.expects_torque() && readings.steps <= self.max_gap;
         if let Some(fault) = Monitor::status(readings.status, has_torque) {
             self.fail(fault);
         }
@@ -115,6 +125,22 @@ impl Controller {
         }
     }
 
+    /// Whether the drives should have torque: while the brake opens they may not be on yet.
+    pub fn expects_torque(&self) -> bool {
+        self.state.is_powered() && (self.drives_on || !matches!(self.state, State::Enabling(_)))
+    }
+
+    /// Holds a lift that was at rest where it is, as its brake closes: the path of the stop may lead on.
+    // Out of line: rare in a sample.
+    #[inline(never)]
+    pub(super) fn hold_lift(&mut self) {
+        if let Some(place) = self.lift_held {
+            let Setpoint { reference, ahead } = &mut self.setpoint;
+            (reference.q.z, reference.qd.z, reference.qdd.z) = (place, 0.0, 0.0);
+            (ahead.qd.z, ahead.qdd.z) = (0.0, 0.0);
+        }
+    }
+
     /// Reacts to what was felt in this sample. The torques of the last one go on for it: those of the law would be the answer to readings that
     /// are wrong.
     // Out of line: rare in a sample.
@@ -122,8 +148,8 @@ impl Controller {
     pub(super) fn react(&mut self, felt: Felt) -> Actions {
         match felt {
             Felt::Fault(fault) => self.fail(fault),
-            Felt::Missed(samples) => {
-                self.missed = samples;
+            Felt::Missed => {
+                self.missed = 1;
                 self.unlearn();
             }
             Felt::Nothing => {}
@@ -152,20 +178,30 @@ impl Controller {
         };
         let status = readings.status;
         if event == Event::BrakeClosed && status.contains(DriveStatus::BRAKE_RELEASED) {
-            self.fail(Fault::value(
-                Cause::DriveFault,
-                f32::from(status.bits()),
-                0.0,
-            ));
+            let status = f32::from(status.bits());
+            let fault = Fault::value(Cause::DriveFault, status, 0.0);
+            self.fail(fault);
+            if self.unheld == 0 {
+                // Told once, also where it changes nothing.
+                self.unheld = 1;
+                self.alarm.get_or_insert(fault);
+            }
         } else {
             self.event(event);
         }
     }
 
-    /// Watches the brake of an arm without torque, which it alone holds. One that does not close in its time, or has opened by itself, is told
-    /// once, and keeps the arm from being ready.
-    pub(super) fn watch_brake(&mut self, readings: &Readings) {
+    /// Watches an arm without torque. Ready, it needs sound drives, and no encoder may jump. The brake alone holds it: one that does not close
+    /// in its time, or has opened by itself, is told once, and keeps the arm from being ready.
+    pub(super) fn watch_at_rest(&mut self, readings: &Readings, q: &Vector4<f32>) {
         let status = readings.status;
+        if self.state == State::Ready {
+            let moved = self.setpoint.reference.q - q;
+            let jump = self.monitor.jumped(&moved, readings.steps);
+            if let Some(fault) = Monitor::status(status, false).or(jump) {
+                self.fail(fault);
+            }
+        }
         if !status.contains(DriveStatus::BRAKE_RELEASED) {
             self.unheld = 0;
             return;

@@ -150,8 +150,9 @@ fn of_frames(content: Content, kind: FrameFault) -> Option<&'static [Cause]> {
     Some(match (content, kind) {
         (_, FrameFault::Duplicate) => &[],
         (Content::Feedback, FrameFault::Loss(_) | FrameFault::Burst(..)) => GAP,
-        (Content::Feedback, FrameFault::Corrupt(_)) => &[Cause::Corrupted],
-        (Content::Feedback, FrameFault::BadValue(_)) => &[Cause::BadValue],
+        (Content::Feedback, FrameFault::Corrupt(_)) => &[Cause::Corrupted, Cause::FeedbackLost],
+        // Below 800 Hz two bad ones make the gap too long.
+        (Content::Feedback, FrameFault::BadValue(_)) => &[Cause::BadValue, Cause::FeedbackLost],
         (Content::Feedback, FrameFault::Replay(_) | FrameFault::Reorder(_)) => OLD,
         (Content::Feedback, FrameFault::Delay(_)) => HELD_UP,
         (Content::Feedback, FrameFault::Jitter(_)) => &[
