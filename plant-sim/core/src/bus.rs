@@ -63,6 +63,7 @@ pub struct Delivery {
 /// A controller sends its mailboxes in the order of their priority (as bxCAN by default, M_CAN in queue mode), frames
 /// of one identifier in the order of arrival: a FIFO would let a heartbeat delay a command. A mailbox is free again
 /// once its frame is valid for the receivers; until then the frame is sent again and again.
+#[derive(Clone)]
 pub struct BuiltinBus {
     timing: BitTiming,
     /// Duration of [`OCCURRENCE`].

@@ -24,7 +24,7 @@ const GUARD_SAMPLES: u32 = 2;
 ///
 /// It counts time in samples like every controller in lock-step ([`SampleClock`]): the same frames then lead to the
 /// same answers, in this process, in another and on a board. Without feedback, its time follows the caller's.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct InProcess {
     config: Config,
     node: Node,

@@ -18,6 +18,7 @@ use super::{BuiltinBus, NodeId, NodeSet};
 pub(super) const DELIMITER: u32 = 8;
 
 /// What happens next on the bus, as far as known.
+#[derive(Clone)]
 pub(super) enum Next {
     Transmission(Transmission),
     /// This node takes part again.
@@ -39,6 +40,7 @@ impl Next {
 }
 
 /// An attempt to send a frame.
+#[derive(Clone)]
 pub(super) struct Transmission {
     pub(super) start: Instant,
     /// When it is known what becomes of it: the frame is valid, or an error flag begins.
@@ -53,6 +55,7 @@ pub(super) struct Transmission {
 }
 
 /// Frames of one identifier that were sent at the same instant and differ: arbitration cannot separate them.
+#[derive(Clone)]
 pub(super) struct Clash {
     /// The bit in which they do.
     pub(super) hit: Hit,
@@ -69,6 +72,7 @@ impl Transmission {
 }
 
 /// What is wrong with an attempt.
+#[derive(Clone)]
 pub(super) struct Trouble {
     pub(super) hit: Option<Hit>,
     /// Nodes that take part, in the order of the course's readers.

@@ -11,6 +11,7 @@ const OCCURRENCES: u64 = 128;
 pub(super) const OCCURRENCE: u32 = 11;
 
 /// Frame in a transmit mailbox.
+#[derive(Clone)]
 pub(super) struct Mailbox {
     pub(super) arbitration: u32,
     pub(super) frame: CanFrame,
@@ -19,6 +20,7 @@ pub(super) struct Mailbox {
 }
 
 /// A node's CAN controller.
+#[derive(Clone)]
 pub(super) struct Node {
     pub(super) capacity: usize,
     /// In the order of filling. They stay there while the node is bus-off, as in an M_CAN.
