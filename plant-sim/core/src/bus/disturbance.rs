@@ -1,11 +1,11 @@
 //! Disturbances of the bus: which attempt to send a frame fails, and where in it.
 
 use oorandom::Rand64;
-use protocol::frame::CanFrame;
 use protocol::schema::MessageInfo;
 use protocol::time::Instant;
 
 use super::anatomy::{Anatomy, Bit, Field};
+use super::node::Mailbox;
 use super::nodes::NodeId;
 
 /// What is wrong with a frame, in the words of ISO 11898-1.
@@ -129,14 +129,14 @@ impl Interference {
         self.acting(start).next().is_some()
     }
 
-    /// The error of a frame that starts at `start`, if it has one.
-    pub(super) fn hit(&self, start: Instant, frame: &CanFrame) -> Option<Hit> {
+    /// The error of the frame of this mailbox that starts at `start`, if it has one.
+    pub(super) fn hit(&self, start: Instant, mailbox: &Mailbox) -> Option<Hit> {
         self.acting(start).find_map(|source| {
             let Disturbed::Message(info, kind) = source.disturbance.what else {
                 return None;
             };
-            let concerned = info.identifies(frame);
-            concerned.then(|| Hit::new(kind, &Anatomy::of(frame), source.place))
+            let concerned = info.identifies(&mailbox.frame);
+            concerned.then(|| Hit::new(kind, mailbox.anatomy(), source.place))
         })
     }
 
