@@ -252,7 +252,7 @@ impl Judge {
         if plant.is_moving() {
             self.moving = plant.t + self.period.duration().seconds();
         }
-        if energy > self.bounds.energy_limit(&plant.q) {
+        if self.bounds.is_too_fast(&plant.q, energy) {
             self.miss(Requirement::Energy);
         }
         let elastic = self.bounds.elastic(&plant.q);
