@@ -11,15 +11,26 @@ pub(crate) fn map<I: Sync, O: Send + Sync>(
     jobs: NonZero<usize>,
     work: impl Fn(&I) -> O + Sync,
 ) -> Vec<O> {
+    map_with(items, jobs, || (), |(), item| work(item))
+}
+
+/// The same, where each thread keeps what `begin` gives it from one item to the next; they come to it in their order.
+pub(crate) fn map_with<I: Sync, O: Send + Sync, T>(
+    items: &[I],
+    jobs: NonZero<usize>,
+    begin: impl Fn() -> T + Sync,
+    work: impl Fn(&mut T, &I) -> O + Sync,
+) -> Vec<O> {
     let next = AtomicUsize::new(0);
     let results: Vec<OnceLock<O>> = items.iter().map(|_| OnceLock::new()).collect();
     thread::scope(|scope| {
         for _ in 0..jobs.get().min(items.len()) {
             scope.spawn(|| {
+                let mut own = begin();
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     let Some(item) = items.get(index) else { break };
-                    let _ = results[index].set(work(item));
+                    let _ = results[index].set(work(&mut own, item));
                 }
             });
         }

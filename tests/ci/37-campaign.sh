@@ -35,7 +35,7 @@ lasts_ms = [0]
 name = "standing"
 scenario = "gate"
 set = ["cycles=1", "cycle=[{ dwell = 0.1 }]"]
-begin_ms = { from = 100, until = 130, step = 0.01 }
+begin_ms = { from = 100, until = 124, step = 0.002 }
 END
 plant-sim campaign plan --cases short.toml >short.jsonl
 began=${EPOCHREALTIME/./}

@@ -26,7 +26,7 @@ mod statistics;
 use protocol::bus::TransmitError;
 use protocol::frame::{CanFrame, StandardId};
 use protocol::time::{Duration, Instant};
-use protocol::wire::{BitTiming, FrameBits, arbitration_field};
+use protocol::wire::{BitTiming, FrameBits};
 
 use affliction::Afflictions;
 use disturbance::Interference;
@@ -63,6 +63,7 @@ pub struct Delivery {
 /// A controller sends its mailboxes in the order of their priority (as bxCAN by default, M_CAN in queue mode), frames
 /// of one identifier in the order of arrival: a FIFO would let a heartbeat delay a command. A mailbox is free again
 /// once its frame is valid for the receivers; until then the frame is sent again and again.
+#[derive(Clone)]
 pub struct BuiltinBus {
     timing: BitTiming,
     /// Duration of [`OCCURRENCE`].
@@ -204,18 +205,17 @@ impl BuiltinBus {
         now: Instant,
         frame: &CanFrame,
     ) -> Result<(), TransmitError> {
+        // A frame that is queued after the start of another does not change what becomes of that.
+        let is_known = matches!(&self.next, Some(Next::Transmission(next)) if next.start < now);
         let node = &mut self.nodes[node.0];
         if node.mailboxes.len() == node.capacity {
             self.statistics.refused += 1;
             return Err(TransmitError::QueueFull);
         }
-        node.mailboxes.push(Mailbox {
-            arbitration: arbitration_field(frame).0,
-            frame: *frame,
-            queued: now,
-            duration: self.timing.duration(FrameBits::exact(frame)),
-        });
-        self.next = self.foreseen();
+        node.mailboxes.push(Mailbox::new(frame, now, &self.timing));
+        if !is_known {
+            self.next = self.foreseen();
+        }
         Ok(())
     }
 
@@ -338,10 +338,5 @@ pub enum Wrong {
 fn babble(timing: &BitTiming) -> Mailbox {
     let id = StandardId::new(0).expect("an identifier of 11 bits");
     let frame = CanFrame::classical(id, &[0; 8]).expect("eight bytes");
-    Mailbox {
-        arbitration: arbitration_field(&frame).0,
-        frame,
-        queued: Instant::ORIGIN,
-        duration: timing.duration(FrameBits::exact(&frame)),
-    }
+    Mailbox::new(&frame, Instant::ORIGIN, timing)
 }

@@ -9,6 +9,7 @@
 //!           request in request, its measure of the lift in lift)
 //! verdict   what a case is held to, and what became of it
 //! trial     one case: the run, what follows it, and the verdict
+//! prelude   what many cases have in common: the run up to their first fault
 //! tally     worst cases by fault and situation, and the bound of the miss rate
 //! ```
 //!
@@ -22,6 +23,7 @@ pub mod expect;
 pub mod judge;
 mod lift;
 mod newest;
+pub mod prelude;
 mod reports;
 mod request;
 pub mod spells;

@@ -136,6 +136,20 @@ impl<'p> Rig<'p> {
         }
     }
 
+    /// A rig in the same state, without peers and faults: peers that are attached under the names of this one's take their places.
+    pub(crate) fn fork<'q>(&self) -> Rig<'q> {
+        Rig {
+            world: self.world.clone(),
+            bus: self.bus.clone(),
+            seats: Vec::new(),
+            names: self.names.clone(),
+            faults: Schedule::default(),
+            pending: self.pending.clone(),
+            out: Outbox::new(),
+            ..*self
+        }
+    }
+
     /// Adds a peer to the bus. Peers that wake at the same instant do so in the order in which they were
     /// added.
     pub fn attach(&mut self, peer: impl Peer + 'p) {
@@ -145,8 +159,11 @@ impl<'p> Rig<'p> {
 
     /// Adds a peer to the bus under this name, for faults and error frames.
     pub fn attach_as(&mut self, name: Node, peer: impl Peer + 'p) {
-        let node = self.bus.attach(MAILBOXES);
-        self.names.push((name, node));
+        let node = self.named(name).unwrap_or_else(|| {
+            let node = self.bus.attach(MAILBOXES);
+            self.names.push((name, node));
+            node
+        });
         self.seat(peer, node);
     }
 

@@ -71,26 +71,47 @@ pub(crate) fn assemble<'p, C: Peer + 'p>(
     config: &RunConfig,
     connect: impl FnOnce(Config) -> Result<C, PeerError>,
 ) -> Result<Rig<'p>, Failure> {
-    let rig = config.rig()?;
-    let controller = connect(rig.controller())?;
-    let drives = Drives::new(&rig.actual, rig.period);
-    let mut rig = Rig::new(&rig);
-    let Scenario { faults, seed, .. } = &config.scenario;
-    let faults: Vec<Planned> = faults.iter().map(|fault| rig.plan(fault)).collect();
-    let faults = faults.as_slice();
-    if !faults.is_empty() {
-        // Before the drives, so that what breaks at a sampling instant is sampled broken.
-        rig.attach_aside(Injector::new(faults, *seed));
+    let setup = config.rig()?;
+    let crew = Crew {
+        drives: Drives::new(&setup.actual, setup.period),
+        operator: Operator::new(&config.asked()),
+        controller: connect(setup.controller())?,
+    };
+    Ok(crew.board(Rig::new(&setup), &config.scenario))
+}
+
+/// The peers of a run.
+#[derive(Clone)]
+pub(crate) struct Crew<D, O, C> {
+    pub(crate) drives: D,
+    pub(crate) operator: O,
+    pub(crate) controller: C,
+}
+
+impl<D: Peer, O: Peer, C: Peer> Crew<D, O, C> {
+    /// The rig with these peers on its bus, and the faults of the scenario.
+    pub(crate) fn board<'p>(self, mut rig: Rig<'p>, scenario: &Scenario) -> Rig<'p>
+    where
+        D: 'p,
+        O: 'p,
+        C: 'p,
+    {
+        let Scenario { faults, seed, .. } = scenario;
+        let faults: Vec<Planned> = faults.iter().map(|fault| rig.plan(fault)).collect();
+        let faults = faults.as_slice();
+        if !faults.is_empty() {
+            // Before the drives, so that what breaks at a sampling instant is sampled broken.
+            rig.attach_aside(Injector::new(faults, *seed));
+        }
+        let drives = Faulty::new(self.drives, Node::Drives, faults, *seed);
+        rig.attach_as(Node::Drives, drives);
+        let operator = Faulty::new(self.operator, Node::Operator, faults, *seed);
+        rig.attach_as(Node::Operator, operator);
+        let controller = Faulty::new(self.controller, Node::Controller, faults, *seed);
+        rig.attach_as(Node::Controller, controller);
+        for fault in faults {
+            rig.spoil(fault, *seed);
+        }
+        rig
     }
-    let drives = Faulty::new(drives, Node::Drives, faults, *seed);
-    rig.attach_as(Node::Drives, drives);
-    let operator = Operator::new(&config.asked());
-    let operator = Faulty::new(operator, Node::Operator, faults, *seed);
-    rig.attach_as(Node::Operator, operator);
-    let controller = Faulty::new(controller, Node::Controller, faults, *seed);
-    rig.attach_as(Node::Controller, controller);
-    for fault in faults {
-        rig.spoil(fault, *seed);
-    }
-    Ok(rig)
 }

@@ -33,7 +33,7 @@ pub use crate::text::Source;
 pub use step::{Elbow, Joints, Jump, Line, Override, Release, Step};
 
 /// What to run. Lengths in m in frame 0, angles in rad. An unknown key is refused.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Name, for the summary.

@@ -13,6 +13,7 @@ use crate::refusal::sentence;
 
 /// State that peers share besides the bus: the robot, used by drives and operator, and what each peer reports to the
 /// run.
+#[derive(Clone)]
 pub struct World {
     /// The robot, as of the last time somebody advanced it.
     pub plant: Plant,

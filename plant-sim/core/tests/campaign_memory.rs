@@ -42,7 +42,7 @@ static MEMORY: Counting = Counting;
 const EACH_CYCLE: u64 = 5;
 
 /// Faults that a sound system survives, of every part of a run that has something to do in every sample. Not among them: errors on
-/// the bus, of which each takes some forty pieces of memory while its bits are worked out.
+/// the bus, of which each takes some twenty pieces of memory while it is worked out.
 const FAULTS: [Option<&str>; 12] = [
     None,
     Some("feedback:loss=0.01@0.1s"),

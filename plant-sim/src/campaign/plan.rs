@@ -5,10 +5,12 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Lines, Write};
 use std::path::{Path, PathBuf};
 
+use protocol::time::Instant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use sim::campaign::case::{Case, Crossing};
+use sim::campaign::prelude::onset;
 use sim::scenario::Scenario;
 use sim::setup::RunConfig;
 use trace::LogHash;
@@ -192,6 +194,14 @@ impl Plan {
         };
         let place = usize::try_from(number).map_err(|_| none())?;
         self.cases()?.nth(place).ok_or_else(none)?
+    }
+
+    /// Up to when a case is its situation without a fault; the origin of time if the plan does not have that.
+    pub(super) fn onset(&self, case: &Case) -> Instant {
+        let situation = self.situations.get(&case.situation);
+        situation.map_or(Instant::ORIGIN, |situation| {
+            onset(&case.scenario(situation))
+        })
     }
 
     /// What to run for a case.

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use protocol::time::Period;
 use sim::campaign::case::{Case, planned, what};
+use sim::campaign::prelude::Prelude;
 use sim::campaign::verdict::{Requirement, Verdict};
 use sim::faults::{End, Fault, Moment, What, Window};
 use sim::plant::defect::{EncoderDefect, MotorDefect};
@@ -34,12 +35,14 @@ pub struct Shrunk {
 /// # Errors
 /// The case cannot begin.
 pub fn shrink(plan: &Plan, case: &Case) -> Result<Option<Shrunk>, CampaignError> {
-    let verdict = judge(plan, case)?;
+    let mut prelude = None;
+    let verdict = judge(plan, case, &mut prelude)?;
     if verdict.missed.is_empty() {
         return Ok(None);
     }
     let mut search = Search {
         plan,
+        prelude,
         rate_hz: plan.config(case)?.scenario.rate_hz,
         missed: verdict.missed.clone(),
         found: Shrunk {
@@ -58,6 +61,7 @@ pub fn shrink(plan: &Plan, case: &Case) -> Result<Option<Shrunk>, CampaignError>
 
 struct Search<'p> {
     plan: &'p Plan,
+    prelude: Option<Prelude>,
     rate_hz: f64,
     missed: BTreeSet<Requirement>,
     found: Shrunk,
@@ -70,7 +74,7 @@ impl Search<'_> {
             faults,
             ..self.found.case.clone()
         };
-        let verdict = judge(self.plan, &case)?;
+        let verdict = judge(self.plan, &case, &mut self.prelude)?;
         let fails = !verdict.missed.is_disjoint(&self.missed);
         if fails {
             self.found = Shrunk { case, verdict };

@@ -4,10 +4,10 @@ use std::num::NonZero;
 use std::path::Path;
 
 use sim::campaign::case::Case;
+use sim::campaign::prelude::Prelude;
 use sim::campaign::tally::Outcome;
-use sim::campaign::trial;
 use sim::campaign::verdict::Verdict;
-use sim::controller::InProcess;
+use sim::run::Failure;
 
 use super::CampaignError;
 use super::plan::{self, Plan};
@@ -15,8 +15,9 @@ use super::shard::{Results, Shard, ShardHeader};
 use crate::parallel;
 use crate::progress::Progress;
 
-/// Cases of a batch for each thread. The threads wait for each other at its end, for as long as one case takes.
-const BATCH: usize = 50;
+/// Cases of a batch for each thread: so many that the preludes of its situations are a small part of the work. The threads wait for
+/// each other at its end, for as long as one case takes.
+const BATCH: usize = 200;
 
 /// What a shard has come to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,8 +60,7 @@ pub fn work(
             break;
         }
         let mut lines = String::new();
-        let verdicts = parallel::map(&batch, jobs, |case| judge(plan, case));
-        for (case, verdict) in batch.into_iter().zip(verdicts) {
+        for (case, verdict) in verdicts(plan, batch, jobs) {
             let verdict = verdict?;
             let outcome = Outcome { case, verdict };
             done.run += 1;
@@ -75,17 +75,42 @@ pub fn work(
     Ok(done)
 }
 
-/// What becomes of a case.
+/// What becomes of these cases, in the order of their numbers.
+fn verdicts(
+    plan: &Plan,
+    mut cases: Vec<Case>,
+    jobs: NonZero<usize>,
+) -> Vec<(Case, Result<Verdict, CampaignError>)> {
+    // So that a prelude leads up to one case after the other.
+    cases.sort_by_cached_key(|case| (case.situation.clone(), plan.onset(case)));
+    let verdicts = parallel::map_with(
+        &cases,
+        jobs,
+        || None,
+        |prelude, case| judge(plan, case, prelude),
+    );
+    let mut verdicts: Vec<_> = cases.into_iter().zip(verdicts).collect();
+    verdicts.sort_by_key(|(case, _)| case.case);
+    verdicts
+}
+
+/// What becomes of a case. It begins with `prelude` if that leads to it, and leaves there what may lead to the next one.
 ///
 /// # Errors
 /// It cannot begin.
-pub fn judge(plan: &Plan, case: &Case) -> Result<Verdict, CampaignError> {
+pub fn judge(
+    plan: &Plan,
+    case: &Case,
+    prelude: &mut Option<Prelude>,
+) -> Result<Verdict, CampaignError> {
     let config = plan.config(case)?;
-    let connect = |config| Ok(InProcess::new(config));
-    let trial = trial::run(&config, connect, &mut ());
-    let (verdict, ..) = trial.map_err(|error| CampaignError::Case {
+    let failed = |error: Failure| CampaignError::Case {
         case: case.case,
         what: error.to_string(),
-    })?;
-    Ok(verdict)
+    };
+    let prelude = match prelude {
+        Some(begun) if begun.leads_to(&config.scenario) => begun,
+        other => other.insert(Prelude::new(&config).map_err(failed)?),
+    };
+    prelude.judge(&config, &mut ()).map_err(failed)
 }

@@ -11,6 +11,7 @@ mod dbc;
 mod dissector;
 mod eval;
 mod failure;
+mod late;
 mod model;
 mod monitor;
 mod pages;
@@ -31,6 +32,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use terminal::only_shown;
 
 pub(crate) use failure::Failure;
+use late::Late;
 
 /// In short what docs/exit-codes.md says.
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 the run or check failed; 2 wrong usage or input; 3 nothing was judged; \
@@ -52,51 +54,51 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Run a scenario (the default command).
-    Run(Box<run::NamedRunArgs>),
+    Run(Box<Late<run::NamedRunArgs>>),
     /// Check a scenario before a run: what would be refused or not followed, how long it takes, what torque it needs.
-    Check(check::CheckArgs),
+    Check(Late<check::CheckArgs>),
     /// Run many cases with a fault each, on one machine or on a cluster, and judge them.
     #[command(subcommand)]
-    Campaign(campaign::CampaignCommand),
+    Campaign(Late<campaign::CampaignCommand>),
     /// Measure what the controller attains, beside what could be attained.
     #[command(subcommand)]
-    Bench(bench::BenchCommand),
+    Bench(Late<bench::BenchCommand>),
     /// Count the instructions and the stack that the controller takes on the emulated Cortex-M4F.
-    Cost(cost::CostArgs),
+    Cost(Late<cost::CostArgs>),
     /// Plant faults into the controller on the emulated Cortex-M4F, and see how they end.
-    Crash(crash::CrashArgs),
+    Crash(Late<crash::CrashArgs>),
     /// Compute kinematics or dynamics for the rows of a CSV table on standard input.
-    Eval(eval::EvalArgs),
+    Eval(Late<eval::EvalArgs>),
     /// Measure the timing of the loop with an external controller, against the watchdog limits.
-    Timing(timing::TimingArgs),
+    Timing(Late<timing::TimingArgs>),
     /// Compare two runs on one page.
-    Report(report::ReportArgs),
+    Report(Late<report::ReportArgs>),
     /// Show a run, or a bus, on a page in the browser while it lives, and take part in it.
-    View(view::ViewArgs),
+    View(Late<view::ViewArgs>),
     /// Write the page that runs the simulation in a browser.
     #[command(alias = "whatif")]
-    WhatIf(what_if::WhatIfArgs),
+    WhatIf(Late<what_if::WhatIfArgs>),
     /// Inspect a recorded trace.
     #[command(subcommand)]
-    Trace(trace::TraceCommand),
+    Trace(Late<trace::TraceCommand>),
     /// Watch a bus: identifiers, rates, values, load, states and faults.
-    Monitor(monitor::MonitorArgs),
+    Monitor(Late<monitor::MonitorArgs>),
     /// Record a bus into a file, or into several by size.
-    Record(record::RecordArgs),
+    Record(Late<record::RecordArgs>),
     /// List and set parameters of controller and drives over a bus.
-    Parameters(parameters::ParametersArgs),
+    Parameters(Late<parameters::ParametersArgs>),
     /// Write the messages of the link as a DBC file.
-    Dbc(dbc::DbcArgs),
+    Dbc(Late<dbc::DbcArgs>),
     /// Write the messages of the link as a dissector for Wireshark (Lua).
-    Dissector(dissector::DissectorArgs),
+    Dissector(Late<dissector::DissectorArgs>),
     /// Print the JSON schema of a file or of JSON output.
-    Schema(schema::SchemaArgs),
+    Schema(Late<schema::SchemaArgs>),
     /// Write a robot for an external controller (controller --model).
-    Model(model::ModelArgs),
+    Model(Late<model::ModelArgs>),
     /// Write a completion script for a shell: plant-sim completions bash > /etc/bash_completion.d/plant-sim.
-    Completions(pages::CompletionsArgs),
+    Completions(Late<pages::CompletionsArgs>),
     /// Write the manual page: plant-sim man | man -l -.
-    Man(pages::ManArgs),
+    Man(Late<pages::ManArgs>),
 }
 
 /// Executes the command line. An error is one message for the user.

@@ -171,10 +171,12 @@ struct Stuffing {
 impl Stuffing {
     /// Sends the low `count` bits, highest first.
     fn push(&mut self, bits: u64, count: u32) {
-        for shift in (0..count).rev() {
+        let bytes = count / 8;
+        for shift in (8 * bytes..count).rev() {
             let stuffed = self.run.push((bits >> shift & 1) as u8);
             self.inserted += u32::from(stuffed);
         }
+        self.push_bytes(&bits.to_be_bytes()[8 - bytes as usize..]);
     }
 
     /// Sends whole bytes, highest bit first.

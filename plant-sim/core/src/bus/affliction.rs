@@ -25,7 +25,7 @@ pub enum Affliction {
 }
 
 /// Everything that is wrong like this, and when.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Afflictions(Vec<(Affliction, Instant, Instant)>);
 
 impl Afflictions {

@@ -1,11 +1,11 @@
 //! Disturbances of the bus: which attempt to send a frame fails, and where in it.
 
 use oorandom::Rand64;
-use protocol::frame::CanFrame;
 use protocol::schema::MessageInfo;
 use protocol::time::Instant;
 
 use super::anatomy::{Anatomy, Bit, Field};
+use super::node::Mailbox;
 use super::nodes::NodeId;
 
 /// What is wrong with a frame, in the words of ISO 11898-1.
@@ -77,7 +77,7 @@ impl Hit {
 }
 
 /// A disturbance with its chance for the next attempt.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Source {
     disturbance: Disturbance,
     random: Rand64,
@@ -87,13 +87,18 @@ struct Source {
 }
 
 /// All disturbances of a bus. Chances are drawn once an attempt, so that looking ahead changes nothing.
-#[derive(Debug, Default)]
-pub(super) struct Interference(Vec<Source>);
+#[derive(Clone, Debug, Default)]
+pub(super) struct Interference {
+    sources: Vec<Source>,
+    /// Attempts so far.
+    attempts: u64,
+}
 
 impl Interference {
-    /// Adds a disturbance with a sequence of random numbers of its own; its number.
+    /// Adds a disturbance with a sequence of random numbers of its own, as far on as if it had been there from the beginning;
+    /// its number.
     pub(super) fn add(&mut self, disturbance: Disturbance, seed: u64) -> usize {
-        let place = self.0.len();
+        let place = self.sources.len();
         let number = place as u128;
         let mut source = Source {
             disturbance,
@@ -102,20 +107,21 @@ impl Interference {
             chance: 0.0,
             place: 0,
         };
-        source.draw();
-        self.0.push(source);
+        (0..=self.attempts).for_each(|_| source.draw());
+        self.sources.push(source);
         place
     }
 
     /// Gives a disturbance another time.
     pub(super) fn retime(&mut self, number: usize, from: Instant, until: Instant) {
-        let disturbance = &mut self.0[number].disturbance;
+        let disturbance = &mut self.sources[number].disturbance;
         (disturbance.from, disturbance.until) = (from, until);
     }
 
     /// Draws the chances of the next attempt.
     pub(super) fn draw(&mut self) {
-        self.0.iter_mut().for_each(Source::draw);
+        self.attempts += 1;
+        self.sources.iter_mut().for_each(Source::draw);
     }
 
     /// Whether anything is disturbed in an attempt that starts at `start`.
@@ -123,14 +129,14 @@ impl Interference {
         self.acting(start).next().is_some()
     }
 
-    /// The error of a frame that starts at `start`, if it has one.
-    pub(super) fn hit(&self, start: Instant, frame: &CanFrame) -> Option<Hit> {
+    /// The error of the frame of this mailbox that starts at `start`, if it has one.
+    pub(super) fn hit(&self, start: Instant, mailbox: &Mailbox) -> Option<Hit> {
         self.acting(start).find_map(|source| {
             let Disturbed::Message(info, kind) = source.disturbance.what else {
                 return None;
             };
-            let concerned = info.identifies(frame);
-            concerned.then(|| Hit::new(kind, &Anatomy::of(frame), source.place))
+            let concerned = info.identifies(&mailbox.frame);
+            concerned.then(|| Hit::new(kind, mailbox.anatomy(), source.place))
         })
     }
 
@@ -141,7 +147,7 @@ impl Interference {
     }
 
     fn acting(&self, start: Instant) -> impl Iterator<Item = &Source> {
-        self.0.iter().filter(move |source| {
+        self.sources.iter().filter(move |source| {
             let Disturbance {
                 share, from, until, ..
             } = source.disturbance;

@@ -18,6 +18,7 @@ use super::{BuiltinBus, NodeId, NodeSet};
 pub(super) const DELIMITER: u32 = 8;
 
 /// What happens next on the bus, as far as known.
+#[derive(Clone)]
 pub(super) enum Next {
     Transmission(Transmission),
     /// This node takes part again.
@@ -39,6 +40,7 @@ impl Next {
 }
 
 /// An attempt to send a frame.
+#[derive(Clone)]
 pub(super) struct Transmission {
     pub(super) start: Instant,
     /// When it is known what becomes of it: the frame is valid, or an error flag begins.
@@ -53,6 +55,7 @@ pub(super) struct Transmission {
 }
 
 /// Frames of one identifier that were sent at the same instant and differ: arbitration cannot separate them.
+#[derive(Clone)]
 pub(super) struct Clash {
     /// The bit in which they do.
     pub(super) hit: Hit,
@@ -69,6 +72,7 @@ impl Transmission {
 }
 
 /// What is wrong with an attempt.
+#[derive(Clone)]
 pub(super) struct Trouble {
     pub(super) hit: Option<Hit>,
     /// Nodes that take part, in the order of the course's readers.
@@ -135,22 +139,26 @@ impl BuiltinBus {
         let candidates =
             || nodes().filter_map(|(index, _)| Some((index, self.candidate(index, start)?.1)));
         let (first, winner) = candidates().min_by_key(|(_, mailbox)| mailbox.arbitration)?;
-        let (mut frame, mut duration, mut clash) = (winner.frame, winner.duration, None);
+        let (mut mailbox, mut clash) = (winner, None);
         let mut from = NodeSet::default();
         from.insert(first);
         let is_equal = |(_, it): &(usize, &Mailbox)| it.arbitration == winner.arbitration;
         let equals = || candidates().filter(is_equal);
         if equals().nth(1).is_some() {
-            if equals().any(|(_, mailbox)| mailbox.frame != frame) {
+            let mut frame = winner.frame;
+            if equals().any(|(_, it)| it.frame != frame) {
                 let frames = equals().map(|(index, it)| (index, it.frame));
                 (frame, clash) = self.clash(frames.collect());
             }
             from = NodeSet::default();
-            for (index, mailbox) in equals().filter(|(_, mailbox)| mailbox.frame == frame) {
+            for (index, it) in equals().filter(|(_, it)| it.frame == frame) {
                 from.insert(index);
-                duration = mailbox.duration;
+                mailbox = it;
             }
         }
+        let Mailbox {
+            frame, duration, ..
+        } = *mailbox;
         let mut next = Transmission {
             start,
             end: start + duration.saturating_sub(self.after_valid),
@@ -160,9 +168,9 @@ impl BuiltinBus {
             clash,
             trouble: None,
         };
-        next.trouble = self.trouble(&next);
+        next.trouble = self.trouble(&next, mailbox);
         if let Some((flagged, flags)) = next.trouble.as_ref().and_then(|it| it.course.destroyed) {
-            let anatomy = Anatomy::of(&next.frame);
+            let anatomy = mailbox.anatomy();
             let bits = anatomy.until(match flagged {
                 Flagged::Bit(index) => index,
                 Flagged::Field(field) => anatomy.first(field),
@@ -223,8 +231,8 @@ impl BuiltinBus {
         (frame.expect("one frame is left"), clash)
     }
 
-    /// What is wrong with an attempt, if anything is.
-    fn trouble(&self, next: &Transmission) -> Option<Box<Trouble>> {
+    /// What is wrong with an attempt to send the frame of this mailbox, if anything is.
+    fn trouble(&self, next: &Transmission, mailbox: &Mailbox) -> Option<Box<Trouble>> {
         let Transmission { start, from, .. } = *next;
         let losers = next.losers();
         let others = || {
@@ -241,7 +249,7 @@ impl BuiltinBus {
         if calm && others().next().is_some() {
             return None;
         }
-        let hit = self.interference.hit(start, &next.frame);
+        let hit = self.interference.hit(start, mailbox);
         let for_all = hit.is_some_and(|hit| hit.kind == ErrorKind::Crc);
         let reader = |(index, node): (usize, &Node)| {
             let reader = Reader {

@@ -1,8 +1,12 @@
 //! A node's CAN controller, from the bus's side.
 
+use std::cell::OnceCell;
+
 use protocol::frame::CanFrame;
 use protocol::time::{Duration, Instant};
+use protocol::wire::{BitTiming, FrameBits, arbitration_field};
 
+use super::anatomy::Anatomy;
 use super::counters::{Counters, State};
 
 /// Occurrences of eleven recessive bits after which a bus-off node may take part again.
@@ -11,14 +15,35 @@ const OCCURRENCES: u64 = 128;
 pub(super) const OCCURRENCE: u32 = 11;
 
 /// Frame in a transmit mailbox.
+#[derive(Clone)]
 pub(super) struct Mailbox {
     pub(super) arbitration: u32,
     pub(super) frame: CanFrame,
     pub(super) queued: Instant,
     pub(super) duration: Duration,
+    /// Once somebody has asked for it.
+    anatomy: OnceCell<Anatomy>,
+}
+
+impl Mailbox {
+    pub(super) fn new(frame: &CanFrame, queued: Instant, timing: &BitTiming) -> Self {
+        Self {
+            arbitration: arbitration_field(frame).0,
+            frame: *frame,
+            queued,
+            duration: timing.duration(FrameBits::exact(frame)),
+            anatomy: OnceCell::new(),
+        }
+    }
+
+    /// The bits of the frame: taken apart once, however often the frame is sent.
+    pub(super) fn anatomy(&self) -> &Anatomy {
+        self.anatomy.get_or_init(|| Anatomy::of(&self.frame))
+    }
 }
 
 /// A node's CAN controller.
+#[derive(Clone)]
 pub(super) struct Node {
     pub(super) capacity: usize,
     /// In the order of filling. They stay there while the node is bus-off, as in an M_CAN.

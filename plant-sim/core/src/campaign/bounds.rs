@@ -130,8 +130,8 @@ impl Bounds {
         self.stops.energy(&Vector4::from(*q))
     }
 
-    /// The most kinetic energy at this pose that the speed limits allow, J.
-    pub fn energy_limit(&self, q: &[f64; 4]) -> f64 {
+    /// Whether this is more kinetic energy (J) than the speed limits allow at this pose.
+    pub fn is_too_fast(&self, q: &[f64; 4], energy: f64) -> bool {
         let at = self.arm.at(&Vector4::from(*q));
         let speed = self.model.limits.velocity.map(|limit| SPEED_FACTOR * limit);
         let signed = |signs: u32| {
@@ -144,8 +144,8 @@ impl Bounds {
             });
             self.energy_at(&at, &qd)
         };
-        // The opposite of all four has the same energy.
-        (0..8).map(signed).fold(0.0, f64::max)
+        // The opposite of all four has the same energy. Most often the first is enough.
+        (0..8).all(|signs| energy > signed(signs))
     }
 
     /// Energy that the moving part of the lift sets free on its way from `high` to `low` (m, downwards positive), J.

@@ -16,6 +16,7 @@ use super::reports::{Reports, is_at_rest};
 use super::request::Request;
 use super::spells::Spells;
 use super::verdict::{Requirement, Verdict, round};
+use crate::faults::Fault;
 use crate::maths::square;
 use crate::model::Payload;
 use crate::observer::{Observer, PlantState, Truth};
@@ -36,15 +37,12 @@ struct Mark {
 }
 
 /// The observer who judges a run with faults.
+#[derive(Clone)]
 pub struct Judge {
     period: Period,
     bounds: Bounds,
     faults: Spells,
     payload: Option<Payload>,
-    /// Whether the brake may stay open, where torque has to go on holding the lift.
-    torque_holds: bool,
-    /// Longest time from a report to the last command that does not know of it.
-    reaction: Duration,
     missed: BTreeSet<Requirement>,
     newest: Newest,
     request: Request,
@@ -81,16 +79,13 @@ impl Judge {
     pub fn new(config: &RunConfig) -> Self {
         let scenario = &config.scenario;
         let period = Period::of_rate(scenario.rate_hz);
-        let faults = Spells::new(&scenario.faults, period);
         let mut judge = Self {
             period,
             bounds: Bounds::new(&config.actual, period.duration().seconds()),
-            torque_holds: faults.leave_the_brake_open(),
-            reaction: period.duration() + faults.lateness(),
             payload: None,
             missed: BTreeSet::new(),
-            newest: Newest::new(period, !faults.lose_count()),
-            faults,
+            newest: Newest::new(period),
+            faults: Spells::new(&[], period),
             request: Request::default(),
             reports: Reports::default(),
             cut: None,
@@ -110,8 +105,15 @@ impl Judge {
             survived: false,
             ended_switching_off: false,
         };
-        judge.weigh();
+        judge.expect(&scenario.faults);
         judge
+    }
+
+    /// Expects these faults, of which none has begun.
+    pub(super) fn expect(&mut self, faults: &[Fault]) {
+        self.faults = Spells::new(faults, self.period);
+        self.newest.counts = !self.faults.lose_count();
+        self.weigh();
     }
 
     /// What is at the flange is known, or may become so.
@@ -167,11 +169,10 @@ impl Judge {
         self.judge_fall();
         let is_latched = self.reports.latched().is_some();
         let is_well = self.survived || self.ended_switching_off;
-        let wrong = self.faults.judge_told(told, is_latched, is_well);
-        self.missed.extend(wrong);
+        self.missed
+            .extend(self.faults.judge_told(told, is_latched, is_well));
         let end = self.last.map_or(0.0, |last| last.t);
-        if self.reports.latched().is_some() && !self.torque_holds && self.newest.enables_torque(end)
-        {
+        if is_latched && !self.faults.leave_the_brake_open() && self.newest.enables_torque(end) {
             self.miss(Requirement::Standstill);
         }
         let stopped = self.detected.is_some();
@@ -221,7 +222,7 @@ impl Judge {
             && !control.contains(ControlWord::QUICK_STOP);
         if let Some(reported) = self.reports.latched()
             && normal
-            && time.since(reported) > self.reaction
+            && time.since(reported) > self.period.duration() + self.faults.lateness()
         {
             self.miss(Requirement::Reaction);
         }
@@ -251,7 +252,7 @@ impl Judge {
         if plant.is_moving() {
             self.moving = plant.t + self.period.duration().seconds();
         }
-        if energy > self.bounds.energy_limit(&plant.q) {
+        if self.bounds.is_too_fast(&plant.q, energy) {
             self.miss(Requirement::Energy);
         }
         let elastic = self.bounds.elastic(&plant.q);
@@ -279,7 +280,7 @@ impl Judge {
                 return;
             }
             if now.time - detected.time > self.bounds.torque_off_s() {
-                if self.torque_holds {
+                if self.faults.leave_the_brake_open() {
                     return;
                 }
                 self.miss(Requirement::Standstill);

@@ -21,18 +21,18 @@ pub(super) struct Newest {
     /// Since when the brake is open that is to be closed.
     open: Option<Instant>,
     /// Whether the number of a sample tells its time.
-    counts: bool,
+    pub(super) counts: bool,
 }
 
 impl Newest {
-    pub(super) fn new(period: Period, counts: bool) -> Self {
+    pub(super) fn new(period: Period) -> Self {
         Self {
             control: ControlWord::EMPTY,
             time: Instant::ORIGIN,
             sample: None,
             period,
             open: None,
-            counts,
+            counts: true,
         }
     }
 

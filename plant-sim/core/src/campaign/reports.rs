@@ -6,7 +6,7 @@ use protocol::time::Instant;
 use super::expect::stops_under_control;
 
 /// The first report of each kind, and whether there were more.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Reports {
     /// While torque was on: the fault is latched.
     latched: Option<(Instant, Cause)>,

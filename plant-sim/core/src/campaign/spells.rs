@@ -104,7 +104,7 @@ impl Spells {
         self.all.iter().any(|spell| is(spell.what))
     }
 
-    /// Whether the brake may be open where it should hold.
+    /// Whether the brake may be open where it should hold, and torque has to go on holding the lift.
     pub(super) fn leave_the_brake_open(&self) -> bool {
         self.any(|what| {
             matches!(

@@ -27,23 +27,33 @@ pub fn run<'p, C: Peer + 'p, O: Observer>(
     observer: &mut O,
 ) -> Result<(Verdict, Rig<'p>, Result<(), RunError>), Failure> {
     let mut rig = assemble(config, connect)?;
-    let mut observers = (Judge::new(config), observer);
+    let (verdict, result) = judged(&mut rig, Judge::new(config), observer)?;
+    Ok((verdict, rig, result))
+}
+
+/// What becomes of a run from where it is: the verdict, and its end.
+pub(super) fn judged<O: Observer>(
+    rig: &mut Rig<'_>,
+    judge: Judge,
+    observer: &mut O,
+) -> Result<(Verdict, Result<(), RunError>), Failure> {
+    let mut observers = (judge, observer);
     let result = rig.run(&mut (), &mut observers);
     // A scenario ends as soon as torque is off: time to come to rest.
     let latest = rig.now() + COASTING;
-    watch(&mut rig, &mut observers)?;
+    watch(rig, &mut observers)?;
     while !observers.0.has_stood(WATCHED) && rig.now() < latest {
-        watch(&mut rig, &mut observers)?;
+        watch(rig, &mut observers)?;
     }
     observers.0.ended(result.is_ok());
-    watch(&mut rig, &mut observers)?;
+    watch(rig, &mut observers)?;
     if let Some(frame) = observers.0.temptation() {
         rig.inject(&frame);
-        watch(&mut rig, &mut observers)?;
+        watch(rig, &mut observers)?;
     }
     match result {
         Err(RunError::Output(source)) => Err(Failure::Output(source)),
-        result => Ok((observers.0.finish(), rig, result)),
+        result => Ok((observers.0.finish(), result)),
     }
 }
 

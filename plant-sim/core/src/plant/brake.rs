@@ -123,7 +123,7 @@ impl Brake {
     /// Friction against a sliding lift, N.
     pub(super) fn sliding_friction(&self, speed: f64) -> f64 {
         if self.is_sliding() {
-            coulomb(self.capacity, Self::GRIP_SPEED, speed)
+            coulomb(&[self.capacity], &[Self::GRIP_SPEED], &[speed])[0]
         } else {
             0.0
         }
@@ -132,7 +132,7 @@ impl Brake {
     /// That friction divided by speed.
     pub(super) fn sliding_secant(&self, speed: f64) -> f64 {
         if self.is_sliding() {
-            coulomb_secant(self.capacity, Self::GRIP_SPEED, speed)
+            coulomb_secant(&[self.capacity], &[Self::GRIP_SPEED], &[speed])[0]
         } else {
             0.0
         }

@@ -89,17 +89,15 @@ impl Drive {
     /// Friction against joint speeds `qd`: `viscous qd + coulomb tanh(qd / eps)`.
     pub fn friction(&self, qd: &Vector4<f64>) -> Vector4<f64> {
         let train = &self.train;
-        Vector4::from_fn(|i, _| {
-            train.viscous[i] * qd[i] + coulomb(train.coulomb[i], train.coulomb_eps[i], qd[i])
-        })
+        let coulomb = coulomb(&train.coulomb, &train.coulomb_eps, &(*qd).into());
+        Vector4::from_fn(|i, _| train.viscous[i] * qd[i] + coulomb[i])
     }
 
     /// Friction divided by speed, positive even at rest.
     pub fn friction_secant(&self, qd: &Vector4<f64>) -> Vector4<f64> {
         let train = &self.train;
-        Vector4::from_fn(|i, _| {
-            train.viscous[i] + coulomb_secant(train.coulomb[i], train.coulomb_eps[i], qd[i])
-        })
+        let coulomb = coulomb_secant(&train.coulomb, &train.coulomb_eps, &(*qd).into());
+        Vector4::from_fn(|i, _| train.viscous[i] + coulomb[i])
     }
 
     /// Least and greatest torque (N m) that the motor of `axis` can give at `speed` (rad/s).

@@ -53,7 +53,7 @@ impl Rig<'_> {
         owner.is_some_and(|node| !delivery.from.contains(node))
     }
 
-    fn named(&self, name: Node) -> Option<NodeId> {
+    pub(super) fn named(&self, name: Node) -> Option<NodeId> {
         let found = self.names.iter().find(|(other, _)| *other == name);
         found.map(|(_, node)| *node)
     }
