@@ -10,6 +10,7 @@
 
 mod caps;
 pub mod clock;
+pub mod curve;
 pub mod path;
 pub mod planner;
 pub mod profile;
@@ -91,6 +92,16 @@ pub struct Lift {
 }
 
 impl Lift {
+    /// At rest there, until its strokes are known.
+    fn at_rest(from: f32) -> Self {
+        Self {
+            from,
+            up: SCurve::default(),
+            down: SCurve::default(),
+            down_start: 0.0,
+        }
+    }
+
     /// d3 and its derivatives at `t`. The descent begins no sooner than the rise has ended.
     fn at(&self, t: f32) -> Sample {
         let t_down = t - self.down_start;
@@ -118,8 +129,6 @@ pub struct Trajectory {
     pub profile: SCurve,
     /// Time at which the motion along the path begins, s (above 0 in a jump).
     pub start: f32,
-    /// Vertical part of a jump.
-    pub lift: Option<Lift>,
     /// Duration before scaling, s.
     pub span: f32,
     /// Time scale, 0 < scale <= 1: the move lasts `span / time_scale`.
@@ -139,7 +148,7 @@ impl Trajectory {
     /// Reference at `t` seconds after the start, held at both ends.
     ///
     /// # Errors
-    /// A line that has not been surveyed by the planner may leave the reach; a planned one cannot.
+    /// A curve of the tool that has not been surveyed by the planner may leave the reach; a planned one cannot.
     pub fn at(&self, arm: &ArmModel, t: f32) -> Result<Reference, PathError> {
         let mut setpoint = Setpoint::rest(Vector4::zeros());
         self.evaluate(arm, t, None, &mut setpoint)?;
@@ -147,7 +156,7 @@ impl Trajectory {
     }
 
     /// As [`Trajectory::at`], and how the arm should move `lead` seconds later: at the place of that instant, but for the third
-    /// derivative of a line, which a few milliseconds leave without effect.
+    /// derivative of a curve of the tool, which a few milliseconds leave without effect.
     ///
     /// # Errors
     /// As [`Trajectory::at`].
@@ -179,7 +188,7 @@ impl Trajectory {
         let squared = scale * scale;
         match &self.path {
             // As below, without what is zero: nearly every move is one of these.
-            Path::Joint { start, delta } => {
+            Path::Joint { start, delta, lift } => {
                 reference.q = start + delta * now.s;
                 reference.qd = delta * (now.v * scale);
                 reference.qdd = delta * (now.a * squared);
@@ -187,8 +196,15 @@ impl Trajectory {
                     ahead.qd = delta * (then.v * scale);
                     ahead.qdd = delta * (then.a * squared);
                 }
+                if let Some(lift) = lift {
+                    let now = lift.at(t);
+                    let then = later.map_or(now, |later| lift.at(later));
+                    reference.q.z = now.s;
+                    (reference.qd.z, reference.qdd.z) = (now.v * scale, now.a * squared);
+                    (ahead.qd.z, ahead.qdd.z) = (then.v * scale, then.a * squared);
+                }
             }
-            path @ Path::Line { .. } => {
+            path @ Path::Tool { .. } => {
                 let PathPoint { q, dq, ddq } = path.at(arm, now.s)?;
                 let dq_then = dq + ddq * (then.s - now.s);
                 reference.q = q;
@@ -197,13 +213,6 @@ impl Trajectory {
                 ahead.qd = dq_then * (then.v * scale);
                 ahead.qdd = (dq_then * then.a + ddq * (then.v * then.v)) * squared;
             }
-        }
-        if let Some(lift) = &self.lift {
-            let now = lift.at(t);
-            let then = later.map_or(now, |later| lift.at(later));
-            reference.q.z = now.s;
-            (reference.qd.z, reference.qdd.z) = (now.v * scale, now.a * squared);
-            (ahead.qd.z, ahead.qdd.z) = (then.v * scale, then.a * squared);
         }
         Ok(())
     }

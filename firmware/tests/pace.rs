@@ -48,6 +48,7 @@ impl<'a> Run<'a> {
             sequence: 1,
             target,
             speed,
+            tool_speed: 0.0,
         };
         queue.push(request).unwrap();
         while queue.has_to_plan() {
@@ -200,6 +201,22 @@ proptest! {
         check(&IRB_930, &two_kg(), &from, (Target::Line(end, Posture::NEAREST), 1.0), &changes)?;
     }
 
+    #[test]
+    fn arcs_keep_limits_and_path_at_any_pace(
+        r in 0.45f32..0.85, a in -1.0f32..1.0, radius in 0.02f32..0.15, heading in -3.1f32..3.1, turn in 0.5f32..6.0, yaw in -2.0f32..2.0,
+        changes in changes(),
+    ) {
+        let on = |turn: f32| {
+            let angle = heading + turn;
+            let (x, y) = (r * a.cos() + radius * angle.cos(), r * a.sin() + radius * angle.sin());
+            Pose { x, y, z: -0.2, yaw: 0.0 }
+        };
+        let (start, via, end) = (on(0.0), on(0.4 * turn), Pose { yaw, ..on(turn) });
+        let Ok(from) = kinematics::inverse(&IRB_930, &start, kinematics::Elbow::Positive, &Vector4::zeros()) else { return Ok(()) };
+        let via = Vector3::new(via.x, via.y, via.z);
+        check(&IRB_930, &two_kg(), &from, (Target::Arc(via, end, Posture::NEAREST), 1.0), &changes)?;
+    }
+
     /// A pace that does not change makes a move last as much longer.
     #[test]
     fn an_even_pace_stretches_time(from in joints(), to in joints(), pace in 0.01f32..1.0) {
@@ -297,6 +314,7 @@ fn ride(from: &Vector4<f32>, to: &Vector4<f32>, ride: &Ride) -> Result<(), TestC
         sequence: 2,
         target: Target::Joints(second),
         speed: 1.0,
+        tool_speed: 0.0,
     };
     run.queue.push(request).unwrap();
     while run.queue.has_to_plan() {

@@ -50,6 +50,7 @@ fn is_move(request: &MotionRequest) -> bool {
         request,
         MotionRequest::Jump { .. }
             | MotionRequest::MoveLine { .. }
+            | MotionRequest::MoveArc { .. }
             | MotionRequest::MoveJoint { .. }
     )
 }
@@ -57,7 +58,7 @@ fn is_move(request: &MotionRequest) -> bool {
 fn main() {
     println!("| scenario | move | answered after ms |");
     println!("|---|---|---|");
-    for name in ["gate", "square", "pick-place"] {
+    for name in ["gate", "square", "arc", "pick-place"] {
         let mut answers = Answers::default();
         let config = RunConfig::new(Scenario::built_in(name).expect("built in"));
         in_process(&config, &mut answers).expect("a scenario that comes with the program runs");

@@ -34,11 +34,14 @@ const JOINTS: Elements = &[
     ("lift", "m"),
     ("wrist", "rad"),
 ];
+const POINT: Elements = &[("x", "m"), ("y", "m"), ("z", "m")];
 const POSE: Elements = &[("x", "m"), ("y", "m"), ("z", "m"), ("yaw", "rad")];
 
 const ANY: Kind = range(f32::MIN, f32::MAX);
 /// Beyond any joint or Cartesian coordinate of a robot of this size, rad or m.
 const COORDINATE: Kind = range(-100.0, 100.0);
+/// Beyond any speed of such a tool, m/s.
+const TOOL_SPEED: Kind = range(0.0, 100.0);
 const FRACTION: Kind = range(0.0, 1.0);
 const CAUSE: Kind = Kind::Code(Cause::CODES);
 const ELBOW: Kind = Kind::Code(ElbowSide::CODES);
@@ -125,6 +128,7 @@ pub(crate) const MOTION: &[Signal] = &[
     when(5, "line_speed", 18, FRACTION, one!("")),
     when(5, "line_elbow", 22, ELBOW, one!("")),
     when(5, "line_turn", 23, TURN, one!("")),
+    when(5, "line_tool_speed", 24, TOOL_SPEED, one!("m/s")),
     when(6, "jump_target", 2, COORDINATE, POSE),
     when(6, "jump_top", 18, COORDINATE, one!("m")),
     when(6, "jump_clearance", 22, range(0.0, 1.0), one!("m")),
@@ -132,13 +136,7 @@ pub(crate) const MOTION: &[Signal] = &[
     when(6, "jump_elbow", 30, ELBOW, one!("")),
     when(6, "jump_turn", 31, TURN, one!("")),
     when(7, "payload_mass", 2, range(0.0, 100.0), one!("kg")),
-    when(
-        7,
-        "payload_com",
-        6,
-        range(-1.0, 1.0),
-        &[("x", "m"), ("y", "m"), ("z", "m")],
-    ),
+    when(7, "payload_com", 6, range(-1.0, 1.0), POINT),
     when(
         7,
         "payload_inertia",
@@ -159,6 +157,12 @@ pub(crate) const MOTION: &[Signal] = &[
     when(9, "observer", 10, range(0.0, 1000.0), one!("rad/s")),
     when(10, "override_pace", 2, FRACTION, one!("")),
     when(11, "operation", 2, OPERATION, one!("")),
+    when(13, "arc_target", 2, COORDINATE, POSE),
+    when(13, "arc_via", 18, COORDINATE, POINT),
+    when(13, "arc_speed", 30, FRACTION, one!("")),
+    when(13, "arc_elbow", 34, ELBOW, one!("")),
+    when(13, "arc_turn", 35, TURN, one!("")),
+    when(13, "arc_tool_speed", 36, TOOL_SPEED, one!("m/s")),
 ];
 
 /// Report of the controller.

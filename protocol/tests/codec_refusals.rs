@@ -46,7 +46,7 @@ fn wrong_content_is_refused_by_cause() {
         ),
         (
             "unknown tag",
-            protected(&table::MOTION, &[0, 13]),
+            protected(&table::MOTION, &[0, 14]),
             Malformed,
         ),
         (

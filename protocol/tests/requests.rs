@@ -22,7 +22,7 @@ proptest! {
         let frame = encode(&Message::Motion(Motion { sequence: 0, request }), 0).unwrap();
         let tag = frame.data()[1];
         prop_assert!(MotionRequest::NAMES.contains(&(tag, request.name())), "{tag} {request:?}");
-        let moves = ["move-joint", "move-line", "jump"];
+        let moves = ["move-joint", "move-line", "jump", "move-arc"];
         prop_assert_eq!(request.is_move(), moves.contains(&request.name()));
     }
 }
@@ -38,6 +38,14 @@ fn a_pose_is_asked_for_with_a_posture() {
         target,
         speed,
         posture,
+        tool_speed: 0.0,
+    };
+    let arc = MotionRequest::MoveArc {
+        target,
+        via: [0.1; 3],
+        speed,
+        posture,
+        tool_speed: 0.0,
     };
     let jump = MotionRequest::Jump {
         target,
@@ -47,8 +55,8 @@ fn a_pose_is_asked_for_with_a_posture() {
         posture,
     };
     let joint = MotionRequest::MoveJoint { target, speed };
-    let found = [line, jump, joint].map(|request| request.posture());
-    assert_eq!(found, [Some(posture), Some(posture), None]);
+    let found = [line, arc, jump, joint].map(|request| request.posture());
+    assert_eq!(found, [Some(posture), Some(posture), Some(posture), None]);
 }
 
 /// From -2 to 2 by number; the nearest has none.

@@ -94,6 +94,16 @@ async function everyButtonActs(page) {
         await acceptedBy(page, "Line", "move-line");
     });
     check(aside > 300, `a line upwards changes ${aside} pixels of the arm from the side`);
+    const [round] = await moves(page, async () => {
+        await page.getByLabel("x on the way", { exact: true }).fill("500");
+        await page.getByLabel("y on the way", { exact: true }).fill("200");
+        await page.getByLabel("z on the way", { exact: true }).fill("-200");
+        await page.getByLabel("y", { exact: true }).fill("100");
+        await page.getByLabel("Tool speed (0: any)", { exact: true }).fill("800");
+        await acceptedBy(page, "Arc", "move-arc");
+    });
+    check(round > 500, `an arc changes ${round} pixels of the arm from above`);
+    await page.getByLabel("Tool speed (0: any)", { exact: true }).fill("0");
     await page.getByLabel("Step", { exact: true }).fill("15");
     for (const axis of ["shoulder", "elbow", "lift", "wrist"]) {
         const changed = await moves(page, async () => {

@@ -2,6 +2,8 @@
 
 use nalgebra::Vector4;
 
+use super::Lift;
+use super::curve::{Curve, Place};
 use crate::mechanics::arm::ArmModel;
 use crate::mechanics::jacobian::Jacobian;
 use crate::mechanics::kinematics::{self, Elbow, IkError, Pose, Trig};
@@ -22,14 +24,14 @@ pub struct PathPoint {
 pub enum PathError {
     /// Outside the reach or a joint limit.
     Unreachable(IkError),
-    /// |sin theta2| below [`MIN_SIN_ELBOW`], where the joint speeds of a straight line grow without bound.
+    /// |sin theta2| below [`MIN_SIN_ELBOW`], where the joint speeds of a tool on a curve grow without bound.
     Singular {
         /// sin(theta2) at that point.
         sin_elbow: f32,
     },
 }
 
-/// A straight line is refused where |sin(theta2)| falls below this: the joint speeds for a given tool speed are then
+/// A curve of the tool is refused where |sin(theta2)| falls below this: the joint speeds for a given tool speed are then
 /// more than 20 times those at a right-angled elbow.
 pub const MIN_SIN_ELBOW: f32 = 0.05;
 
@@ -42,68 +44,86 @@ pub enum Path {
         start: Vector4<f32>,
         /// End minus start.
         delta: Vector4<f32>,
+        /// Of a jump: what the lift does in place of that, in time.
+        lift: Option<Lift>,
     },
-    /// Straight line of the tool, yaw turning at a constant rate along it.
-    Line {
-        /// Tool pose at s = 0.
-        start: Pose,
-        /// End minus start: dx, dy, dz, dyaw.
-        delta: Vector4<f32>,
-        /// Elbow branch, kept along the whole line.
+    /// Curve of the tool, yaw turning at a constant rate along it.
+    Tool {
+        /// Of the flange.
+        curve: Curve,
+        /// Yaw at s = 0, with the whole turns of axis 4: theta1 + theta2 - theta4.
+        yaw: f32,
+        /// Yaw at the end minus that.
+        turned: f32,
+        /// Elbow branch, kept along the whole curve.
         elbow: Elbow,
-        /// theta4 - (theta1 + theta2 - yaw): whole turns of axis 4, kept along the line.
-        wrist_turns: f32,
     },
 }
 
 impl Path {
-    /// Where a line comes nearest to axis 1, if that is between its ends.
-    pub(super) fn nearest(&self) -> Option<f32> {
-        let Self::Line { start, delta, .. } = self else {
-            return None;
-        };
-        let squared = delta.x * delta.x + delta.y * delta.y;
-        let foot = -(start.x * delta.x + start.y * delta.y) / squared;
-        // Not a number where the tool moves straight up or down.
-        (foot > 0.0 && foot < 1.0).then_some(foot)
+    /// Whether it is an arc.
+    pub(super) fn is_arc(&self) -> bool {
+        matches!(
+            self,
+            Self::Tool {
+                curve: Curve::Arc { .. },
+                ..
+            }
+        )
     }
 
-    /// Joint positions and derivatives at `s`.
+    /// What the lift does in a jump.
+    pub(super) fn lift(&mut self) -> Option<&mut Lift> {
+        match self {
+            Self::Joint { lift, .. } => lift.as_mut(),
+            Self::Tool { .. } => None,
+        }
+    }
+
+    /// Joint positions and derivatives at `s`, but for the lift in a jump.
     ///
     /// # Errors
-    /// Only for a line: beyond reach, or too close to the stretched elbow.
+    /// Only for a curve of the tool: beyond reach, or too close to the stretched elbow.
     pub fn at(&self, arm: &ArmModel, s: f32) -> Result<PathPoint, PathError> {
         match self {
-            Self::Joint { start, delta } => Ok(PathPoint {
+            Self::Joint { start, delta, .. } => Ok(PathPoint {
                 q: start + delta * s,
                 dq: *delta,
                 ddq: Vector4::zeros(),
             }),
-            Self::Line {
-                start,
-                delta,
+            Self::Tool {
+                curve,
+                yaw,
+                turned,
                 elbow,
-                wrist_turns,
             } => {
+                let Place {
+                    position,
+                    tangent,
+                    bend,
+                } = curve.at(s);
                 let pose = Pose {
-                    x: start.x + delta.x * s,
-                    y: start.y + delta.y * s,
-                    z: start.z + delta.z * s,
-                    yaw: start.yaw + delta.w * s,
+                    x: position.x,
+                    y: position.y,
+                    z: position.z,
+                    yaw: yaw + turned * s,
                 };
                 let mut q = kinematics::solve(&arm.geometry, &pose, *elbow)
                     .map_err(PathError::Unreachable)?;
-                q.w = q.x + q.y - pose.yaw + wrist_turns;
+                q.w = q.x + q.y - pose.yaw;
                 let trig = Trig::new(&q);
                 let singular = PathError::Singular { sin_elbow: trig.s2 };
                 if trig.s2.abs() < MIN_SIN_ELBOW {
                     return Err(singular);
                 }
-                // x' is constant, x'' = 0: q' = J^-1 x', q'' = -J^-1 (dJ/ds) q'. The Jacobian's
-                // rate along the path has the same form as its rate in time, with q' for qd.
+                // q' = J^-1 x', q'' = J^-1 (x'' - (dJ/ds) q'). The Jacobian's rate along the path has the same form as its rate
+                // in time, with q' for qd.
                 let jacobian = Jacobian::new(&arm.geometry, &trig);
-                let dq = jacobian.joint_speed(delta).ok_or(singular)?;
-                let ddq = jacobian.joint_speed(&-jacobian.bias(&dq)).ok_or(singular)?;
+                let dq = jacobian
+                    .joint_speed(&tangent.push(*turned))
+                    .ok_or(singular)?;
+                let rest = bend.push(0.0) - jacobian.bias(&dq);
+                let ddq = jacobian.joint_speed(&rest).ok_or(singular)?;
                 Ok(PathPoint { q, dq, ddq })
             }
         }

@@ -9,6 +9,8 @@
 //!   +--------------+-------------------------------------------------> Refusal (reason, axis, value, limit)
 //! ```
 //!
+//! Of an arc, Cruise between Survey and Rest finds the speed at which it can be kept.
+//!
 //! Constant joint acceleration limits would waste half of the robot: a SCARA is bounded by motor torque, and inertia
 //! changes along the way. The planner therefore scales an S-curve to the torques of the model. Its jerk follows from the time in
 //! which the motors take up their torque. Torque is affine in the path acceleration, so each round corrects the accelerations (speeding up and braking, next to rest and next to the peak speed) by the ratio of torque
@@ -17,6 +19,7 @@
 //! trajectories*, 1984).
 
 mod balance;
+mod cruise;
 mod jump;
 mod survey;
 mod verify;
@@ -24,39 +27,56 @@ mod verify;
 use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
+use super::curve::MOST_PARTS;
 use super::path::{Path, PathPoint};
 use super::profile::{Bounds, HalfBounds, SCurve};
 use super::request::{Request, Target, from_path};
 use super::torque_budget::TorqueBudget;
-use super::{Lift, Reference, Trajectory};
+use super::{Reference, Trajectory};
 use crate::mechanics::arm::ArmModel;
 use jump::{Chamfer, Jump};
-use verify::{Before, HALF_STEPS, LINE_STEPS};
+use survey::Apex;
+use verify::Before;
 
-/// Survey points on a line.
-const SURVEY_POINTS: u8 = 24;
 /// Corrections of the accelerations.
 const ROUNDS: u8 = 2;
 /// Samples of each half of the profile in one round.
 const BALANCE_POINTS: u8 = 3;
 /// Largest factor by which one sample of a round changes an acceleration.
 const STEP: f32 = 1.6;
+/// Least speed of the tool that can be asked for, m/s: across the work space that takes hours.
+const LEAST_TOOL_SPEED: f32 = 1e-4;
 /// Moves whose every axis travels less than this (rad or m) end where they begin.
 const NO_TRAVEL: f32 = 1e-6;
+
+/// Of a planner that has planned nothing yet. A constant: one that is built lies on the stack on its way.
+const NO_PATH: Path = Path::Joint {
+    start: Vector4::new(0.0, 0.0, 0.0, 0.0),
+    delta: Vector4::new(0.0, 0.0, 0.0, 0.0),
+    lift: None,
+};
 
 /// Progress of the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Idle,
     /// Joint positions of the target.
-    Aim,
+    Aim {
+        target: Target,
+    },
     /// Path to them.
     Locate {
+        target: Target,
         end: Vector4<f32>,
     },
     Survey {
         point: u8,
         fastest: Vector4<f32>,
+        apex: Apex,
+    },
+    /// Torques at speed, at one place of an arc.
+    Cruise {
+        place: u8,
     },
     /// Torques at rest, at one of three places.
     Rest {
@@ -122,10 +142,14 @@ pub struct Planner {
     stage: Stage,
     draft: Trajectory,
     bounds: Bounds,
-    target: Target,
     speed: f32,
+    /// Greatest speed of the flange along a curve, m/s; 0 for any.
+    tool_speed: f32,
     /// Where the request is a jump.
     jump: Option<Jump>,
+    /// Of an arc: where the arm is most nearly stretched, as a share of the way; in the last pass, when, s. Torques peak there within a
+    /// small part of the time.
+    apex: f32,
     /// Whether moves are for manual operation, in which the [tool](super::tool_speed) is slow.
     slow_tool: bool,
 }
@@ -134,12 +158,12 @@ impl Planner {
     /// Number of calls of [`Planner::work`] after which a plan is complete or refused.
     pub const MAX_STEPS: u32 = {
         let locate = 2;
-        let survey = SURVEY_POINTS as u32 + 1 + 3;
+        let survey = MOST_PARTS as u32 + 1 + cruise::PLACES as u32 + 3;
         let compose = ROUNDS as u32 + 1;
         let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
-        // Its ends, and the borders of the travel's segments; motion and torques. A jump has fewer steps than a line, and the borders of
+        // Its ends, its apex, and the borders of the travel's segments; motion and torques. A jump has fewer steps than an arc, and the borders of
         // its strokes.
-        let verify = 2 * (LINE_STEPS as u32 + 2 * HALF_STEPS as u32 + 2 + 12);
+        let verify = 2 * (2 * MOST_PARTS as u32 + 3 + 12);
         let finish = 1;
         locate + survey + compose + balance + jump::STEPS + verify + finish
     };
@@ -149,13 +173,9 @@ impl Planner {
         Self {
             stage: Stage::Idle,
             draft: Trajectory {
-                path: Path::Joint {
-                    start: Vector4::zeros(),
-                    delta: Vector4::zeros(),
-                },
+                path: NO_PATH,
                 profile: SCurve::default(),
                 start: 0.0,
-                lift: None,
                 span: 0.0,
                 time_scale: 1.0,
                 end: Vector4::zeros(),
@@ -167,9 +187,10 @@ impl Planner {
                 accelerate: HalfBounds::even(1.0, 1.0),
                 brake: HalfBounds::even(1.0, 1.0),
             },
-            target: Target::Joints(Vector4::zeros()),
             speed: 1.0,
+            tool_speed: 0.0,
             jump: None,
+            apex: 0.0,
             slow_tool: false,
         }
     }
@@ -199,11 +220,13 @@ impl Planner {
 
     /// Takes a request for a move from the joint positions `from`.
     pub fn begin(&mut self, request: &Request, from: &Vector4<f32>) {
-        self.target = request.target;
         self.speed = request.speed;
+        self.tool_speed = request.tool_speed;
         self.draft.sequence = request.sequence;
         self.draft.end = *from;
-        self.stage = Stage::Aim;
+        self.stage = Stage::Aim {
+            target: request.target,
+        };
     }
 
     /// One step of planning: one sample of the move, or one profile. When the plan is complete, `Ok`
@@ -211,9 +234,14 @@ impl Planner {
     pub fn work(&mut self, budget: &TorqueBudget<'_>) -> Option<Result<(), Refusal>> {
         let step = match self.stage {
             Stage::Idle => return None,
-            Stage::Aim => self.aim(budget.arm),
-            Stage::Locate { end } => self.locate(budget.arm, &end),
-            Stage::Survey { point, fastest } => self.survey(budget, point, fastest),
+            Stage::Aim { target } => self.aim(budget.arm, target),
+            Stage::Locate { target, end } => self.locate(budget.arm, &target, &end),
+            Stage::Survey {
+                point,
+                fastest,
+                apex,
+            } => self.survey(budget, point, fastest, apex),
+            Stage::Cruise { place } => self.cruise(budget, place),
             Stage::Rest { place } => self.rest(budget, place),
             Stage::Raise { down } => {
                 self.raise(budget, down);
@@ -273,34 +301,39 @@ impl Planner {
 
     /// The end of the move: inverse kinematics are as much as a step of planning.
     #[inline(never)]
-    fn aim(&mut self, arm: &ArmModel) -> Result<(), Refusal> {
+    fn aim(&mut self, arm: &ArmModel, target: Target) -> Result<(), Refusal> {
         if !(self.speed > 0.0 && self.speed <= 1.0) {
             return Err(Refusal::value(RefusalReason::OutOfRange, self.speed, 1.0));
         }
-        let end = self.target.end(arm, &self.draft.end)?;
-        self.stage = Stage::Locate { end };
+        let tool_speed = self.tool_speed;
+        if tool_speed.is_nan() || tool_speed != 0.0 && tool_speed < LEAST_TOOL_SPEED {
+            let limit = LEAST_TOOL_SPEED;
+            return Err(Refusal::value(RefusalReason::OutOfRange, tool_speed, limit));
+        }
+        let end = target.end(arm, &self.draft.end)?;
+        self.stage = Stage::Locate { target, end };
         Ok(())
     }
 
     /// The path to the target.
     #[inline(never)]
-    fn locate(&mut self, arm: &ArmModel, end: &Vector4<f32>) -> Result<(), Refusal> {
-        let (path, gate) = self.target.path(arm, &self.draft.end, end)?;
+    fn locate(
+        &mut self,
+        arm: &ArmModel,
+        target: &Target,
+        end: &Vector4<f32>,
+    ) -> Result<(), Refusal> {
+        let (path, gate) = target.path(arm, &self.draft.end, end)?;
         self.jump = gate.map(|gate| Jump::new(gate, self.slow_tool));
         self.draft.path = path;
         self.draft.start = 0.0;
-        self.draft.lift = self.jump.is_some().then(|| Lift {
-            from: self.draft.end.z,
-            up: SCurve::default(),
-            down: SCurve::default(),
-            down_start: 0.0,
-        });
         self.draft.time_scale = 1.0;
         // For a path along which nothing moves.
         self.draft.profile = SCurve::default();
         self.stage = Stage::Survey {
             point: 0,
             fastest: Vector4::zeros(),
+            apex: Apex::NONE,
         };
         Ok(())
     }
@@ -314,7 +347,7 @@ impl Planner {
     fn compose(&mut self, arm: &ArmModel, round: u8) {
         let travels = self.bounds.speed > 0.0;
         if travels {
-            // The joint acceleration limits as a limit along the path. They vary along a line: left to the last pass.
+            // The joint acceleration limits as a limit along the path. They vary along a curve of the tool: left to the last pass.
             if let Path::Joint { delta, .. } = &self.draft.path {
                 let ceiling = fill(&arm.limits.acceleration, delta);
                 let Bounds {
@@ -341,6 +374,9 @@ impl Planner {
         } else if self.jump.is_some() {
             Stage::Raise { down: false }
         } else {
+            if self.draft.path.is_arc() {
+                self.apex = self.draft.profile.time_at(self.apex);
+            }
             Stage::VERIFY
         };
     }

@@ -1,8 +1,10 @@
 //! A requested move, and its path.
 
-use nalgebra::Vector4;
+use nalgebra::{Vector3, Vector4};
 use protocol::messages::{ElbowSide, Posture, Refusal, RefusalReason, WristTurn};
 
+use super::Lift;
+use super::curve::{Curve, MIN_HEIGHT};
 use super::path::{MIN_SIN_ELBOW, Path, PathError};
 use crate::mechanics::arm::{ArmModel, Axis};
 use crate::mechanics::kinematics::{self, Elbow, IkError, Pose, Wrist};
@@ -15,6 +17,8 @@ pub enum Target {
     Joints(Vector4<f32>),
     /// Straight line of the tool.
     Line(Pose, Posture),
+    /// Arc of the tool through this point: whatever the angle, the way round on which the point lies.
+    Arc(Vector3<f32>, Pose, Posture),
     /// Gate move: up, across (straight in joint space), down.
     Jump {
         /// Tool pose at the end.
@@ -37,6 +41,8 @@ pub struct Request {
     pub target: Target,
     /// Share of full speed, 0 < speed <= 1.
     pub speed: f32,
+    /// Greatest speed of the flange along a line or an arc, m/s; 0 for as fast as the arm can.
+    pub tool_speed: f32,
 }
 
 /// Height that counts as none, m.
@@ -63,16 +69,16 @@ impl Target {
     pub(super) fn end(&self, arm: &ArmModel, from: &Vector4<f32>) -> Result<Vector4<f32>, Refusal> {
         match self {
             Self::Joints(q) => kinematics::within_limits(q, &arm.limits).map_err(from_ik),
-            Self::Line(pose, posture) | Self::Jump { pose, posture, .. } => {
-                joints_of(arm, pose, *posture, from)
-            }
+            Self::Line(pose, posture)
+            | Self::Arc(_, pose, posture)
+            | Self::Jump { pose, posture, .. } => joints_of(arm, pose, *posture, from),
         }
     }
 
     /// The path from the joint positions `from` to those at the end, and the heights of a jump over it.
     ///
     /// # Errors
-    /// A line that would have to change the side of the elbow; the top of a jump outside its bounds.
+    /// A line or an arc that would have to change the side of the elbow; an arc whose points lie on one line; the top of a jump outside its bounds.
     pub(super) fn path(
         &self,
         arm: &ArmModel,
@@ -80,22 +86,29 @@ impl Target {
         end: &Vector4<f32>,
     ) -> Result<(Path, Option<Gate>), Refusal> {
         match self {
-            Self::Joints(_) => Ok((straight(from, end), None)),
-            Self::Line(pose, posture) => Ok((line(arm, from, end, pose, *posture)?, None)),
+            Self::Joints(_) => Ok((straight(from, end, None), None)),
+            Self::Line(pose, posture) => Ok((tool(arm, from, end, None, pose, *posture)?, None)),
+            Self::Arc(via, pose, posture) => {
+                Ok((tool(arm, from, end, Some(via), pose, *posture)?, None))
+            }
             Self::Jump { top, clearance, .. } => {
                 let gate = gate(arm, from, end, *top, *clearance)?;
                 let mut across = *end;
                 across.z = from.z;
-                Ok((straight(from, &across), Some(gate)))
+                Ok((
+                    straight(from, &across, Some(Lift::at_rest(from.z))),
+                    Some(gate),
+                ))
             }
         }
     }
 }
 
-fn straight(from: &Vector4<f32>, to: &Vector4<f32>) -> Path {
+fn straight(from: &Vector4<f32>, to: &Vector4<f32>, lift: Option<Lift>) -> Path {
     Path::Joint {
         start: *from,
         delta: to - from,
+        lift,
     }
 }
 
@@ -119,30 +132,43 @@ fn joints_of(
     kinematics::locate(arm, pose, elbow, wrist).map_err(from_ik)
 }
 
-fn line(
+/// A straight line of the tool, or an arc through a point.
+fn tool(
     arm: &ArmModel,
     from: &Vector4<f32>,
     end: &Vector4<f32>,
+    via: Option<&Vector3<f32>>,
     to: &Pose,
     posture: Posture,
 ) -> Result<Path, Refusal> {
     let elbow = Elbow::of(from);
-    // Stretched it is at both sides, and no line can begin there anyway.
+    // Stretched it is at both sides, and no curve can begin there anyway.
     if Elbow::of(end) != elbow && end.y != 0.0 {
         return Err(Refusal::because(RefusalReason::ElbowSide));
     }
     let start = kinematics::forward(&arm.geometry, from);
     let yaw = |q: &Vector4<f32>| q.x + q.y - q.w;
     let turned = if posture.turn == WristTurn::Nearest {
-        wrap(to.yaw - start.yaw)
+        wrap(to.yaw - yaw(from))
     } else {
         yaw(end) - yaw(from)
     };
-    Ok(Path::Line {
-        start,
-        delta: Vector4::new(to.x - start.x, to.y - start.y, to.z - start.z, turned),
+    let position = |pose: &Pose| Vector3::new(pose.x, pose.y, pose.z);
+    let curve = match via {
+        None => Curve::line(position(&start), &position(to)),
+        Some(via) => Curve::arc(position(&start), via, &position(to)).map_err(|height| {
+            if height.is_nan() {
+                Refusal::because(RefusalReason::NotFinite)
+            } else {
+                Refusal::value(RefusalReason::NoCircle, height, MIN_HEIGHT)
+            }
+        })?,
+    };
+    Ok(Path::Tool {
+        curve,
+        yaw: yaw(from),
+        turned,
         elbow,
-        wrist_turns: from.w - (from.x + from.y - start.yaw),
     })
 }
 

@@ -5,6 +5,7 @@
 
 use nalgebra::Vector4;
 
+use super::curve::Curve;
 use super::path::Path;
 use crate::mechanics::arm::Geometry;
 use crate::mechanics::math::{hypot, sin_cos, sqrt};
@@ -28,12 +29,19 @@ pub fn of(velocity: &Vector4<f32>) -> f32 {
 #[inline(never)]
 pub(super) fn along(path: &Path, geometry: &Geometry, tool: f32) -> f32 {
     let (horizontal, vertical, turning) = match path {
-        Path::Joint { start, delta } => (
+        Path::Joint { start, delta, .. } => (
             horizontal(geometry, start.y, delta),
             delta.z,
             delta.x + delta.y - delta.w,
         ),
-        Path::Line { delta, .. } => (hypot(delta.x, delta.y), delta.z, delta.w),
+        Path::Tool { curve, turned, .. } => {
+            let (horizontal, vertical) = match curve {
+                Curve::Line { delta, .. } => (hypot(delta.x, delta.y), delta.z),
+                // Whatever its plane, it may be level somewhere.
+                arc @ Curve::Arc { .. } => (arc.length(), 0.0),
+            };
+            (horizontal, vertical, *turned)
+        }
     };
     tool / hypot(horizontal + REACH * turning.abs(), vertical)
 }

@@ -28,17 +28,17 @@ pub(crate) fn plan(
     target: Target,
     speed: f32,
 ) -> Result<Trajectory, Refusal> {
-    plan_with(Planner::new(), arm, payload, from, target, speed)
+    plan_with(Planner::new(), arm, payload, from, target, (speed, 0.0))
 }
 
-/// The same by this planner.
+/// The same by this planner, with a speed of the tool, m/s.
 pub(crate) fn plan_with(
     mut planner: Planner,
     arm: &ArmModel,
     payload: &Payload,
     from: &Vector4<f32>,
     target: Target,
-    speed: f32,
+    (speed, tool_speed): (f32, f32),
 ) -> Result<Trajectory, Refusal> {
     let body = Body::new(arm, payload);
     let budget = TorqueBudget { arm, body: &body };
@@ -47,6 +47,7 @@ pub(crate) fn plan_with(
             sequence: 1,
             target,
             speed,
+            tool_speed,
         },
         from,
     );

@@ -131,6 +131,7 @@ fn no_point_of_the_tool_is_planned_faster_than_nine_tenths_of_the_limit() {
         target,
         speed: 1.0,
         posture,
+        tool_speed: 0.0,
     };
     let jump = |target| MotionRequest::Jump {
         target,

@@ -319,6 +319,7 @@ fn speed_of(request: &MotionRequest) -> f32 {
     match request {
         MotionRequest::Jump { speed, .. }
         | MotionRequest::MoveLine { speed, .. }
+        | MotionRequest::MoveArc { speed, .. }
         | MotionRequest::MoveJoint { speed, .. } => *speed,
         _ => 1.0,
     }

@@ -66,10 +66,12 @@ fn readiness(request: &MotionRequest, refusal: &Refusal) -> &'static str {
 
 /// A number without the digits that single precision does not have.
 fn rounded(value: f32) -> f64 {
-    let value = f64::from(value);
-    let micro = (value * 1e6).round() / 1e6;
-    // Of small gains and sines every digit counts.
-    if value.abs() < 1e-3 { value } else { micro }
+    // Of small gains, sines and lengths every digit counts.
+    if value.abs() < 1e-3 {
+        value.to_string().parse().unwrap_or(value.into())
+    } else {
+        (f64::from(value) * 1e6).round() / 1e6
+    }
 }
 
 /// Height of the pose that the lift cannot reach, if it is one.
@@ -104,7 +106,16 @@ fn parameter(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str>
         // Any other value of a jump that is out of range is refused before it is sent.
         (MotionRequest::Jump { .. }, Reason::OutOfRange) if refusal.limit == 0.0 => "top",
         (MotionRequest::Jump { .. }, Reason::JointLimit) if refusal.axis == 2 => "to or top",
+        (
+            MotionRequest::MoveLine { tool_speed, .. } | MotionRequest::MoveArc { tool_speed, .. },
+            Reason::OutOfRange,
+        ) if refusal.value == *tool_speed && refusal.limit < 1.0 => "tool_speed",
         (_, Reason::OutOfRange) if request.is_move() => "speed",
+        (
+            MotionRequest::MoveArc { .. },
+            Reason::TooFar | Reason::TooNear | Reason::JointLimit | Reason::Singular,
+        ) => "to or via",
+        (_, Reason::NoCircle) => "via",
         (_, Reason::TooFar | Reason::TooNear | Reason::JointLimit | Reason::Singular) => "to",
         (_, Reason::ElbowSide) => "elbow",
         (_, Reason::PayloadTooHeavy) => "mass",
@@ -135,12 +146,13 @@ fn unit(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str> {
     use RefusalReason as Reason;
     let units = UNITS.get(usize::from(refusal.axis));
     Some(match (request, refusal.reason) {
-        (_, Reason::TooFar | Reason::TooNear) => "m",
+        (_, Reason::TooFar | Reason::TooNear | Reason::NoCircle) => "m",
         (_, Reason::JointLimit) => units?.0,
         (_, Reason::TorqueTooSmall) => units?.1,
         (_, Reason::PayloadTooHeavy) => "kg",
         (_, Reason::Singular) => "(sine of the elbow)",
         (MotionRequest::Jump { .. }, Reason::OutOfRange) if refusal.limit == 0.0 => "m",
+        (_, Reason::OutOfRange) if parameter(request, refusal) == Some("tool_speed") => "m/s",
         (_, Reason::OutOfRange) => "",
         _ => return None,
     })

@@ -30,7 +30,7 @@ pub(crate) use requirement::Measured;
 pub use requirement::{Axis, Ending, Quantity, Requirement, StateName};
 
 pub use crate::text::Source;
-pub use step::{Elbow, Joints, Jump, Line, Override, Release, Step};
+pub use step::{Arc, Elbow, Joints, Jump, Line, Override, Release, Step};
 
 /// What to run. Lengths in m in frame 0, angles in rad. An unknown key is refused.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]

@@ -223,6 +223,7 @@ impl RunConfig {
             match step {
                 Step::Jump(jump) => target = Some(jump.to),
                 Step::Line(line) => target = Some(line.to),
+                Step::Arc(arc) => target = Some(arc.to),
                 Step::Joints(joints) => {
                     let arm = Arm::new(&self.actual, None);
                     let pose = arm.pose(&arm.at(&joints.to.into()));

@@ -167,6 +167,7 @@ fn what_is_asked_for_goes_over_the_bus_and_is_done() {
         target,
         speed: 0.5,
         posture: Posture::NEAREST,
+        tool_speed: 0.0,
     };
     run.order(Order::Request(line));
     let answers = live(&mut run, &mut seen, 3.0);
@@ -316,7 +317,8 @@ fn orders() -> impl Strategy<Value = Order> {
             MotionRequest::MoveLine {
                 target,
                 speed,
-                posture
+                posture,
+                tool_speed: 0.0
             }
         )),
         (0.0_f32..1.2).prop_map(|pace| Order::Request(MotionRequest::SetOverride { pace })),

@@ -75,7 +75,8 @@ fn documents() -> [(Value, Value, Reader); 3] {
         "payload": nothing, "mismatch": { "friction": 1.0, "payload": 1.0 },
         "cycle": [
             { "jump": { "to": to, "elbow": "positive", "turn": 0, "top": -0.1, "clearance": 0.01, "speed": 0.5 } },
-            { "line": { "to": to, "elbow": "positive", "turn": 0, "speed": 0.5 } },
+            { "line": { "to": to, "elbow": "positive", "turn": 0, "speed": 0.5, "tool_speed": 0.25 } },
+            { "arc": { "via": [0.5, 0.1, -0.2], "to": to, "elbow": "positive", "turn": 0, "speed": 0.5, "tool_speed": 0.25 } },
             { "joints": { "to": [0.0, 1.0, 0.1, 0.0], "speed": 0.5 } },
             { "dwell": 0.1 },
             { "stop": 0.1 },

@@ -1,13 +1,14 @@
 //! What a page can ask for: the page draws what it finds here, and knows none of it by itself.
 
 mod jog;
+mod moves;
 
 use protocol::messages::{Law, Node};
 use protocol::table::TABLE;
 use serde::Serialize;
 use sim::faults::{KINDS, Kind};
 use sim::model::{AXES, RobotModel};
-use sim::scenario::{Scenario, Step};
+use sim::scenario::Scenario;
 use sim::selection::LawChoice;
 
 use super::wish::MOMENTS;
@@ -149,7 +150,7 @@ pub fn of_run(scenario: &Scenario, robot: &RobotModel) -> Vec<Group> {
                 button("Run the scenario", "scenario", &[]),
             ],
         },
-        moves(scenario, robot),
+        moves::moves(scenario, robot),
         Group {
             title: "Speed override",
             hint: Some(
@@ -210,61 +211,6 @@ pub fn of_run(scenario: &Scenario, robot: &RobotModel) -> Vec<Group> {
             )],
         },
     ]
-}
-
-fn moves(scenario: &Scenario, robot: &RobotModel) -> Group {
-    // The first target of the scenario is one that can be reached.
-    let target = scenario.cycle.iter().find_map(|step| match step {
-        Step::Jump(jump) => Some((jump.to, jump.top, jump.clearance)),
-        Step::Line(line) => Some((line.to, line.to[2], 0.0)),
-        _ => None,
-    });
-    let start = scenario.start;
-    let (to, top, clearance) = target.unwrap_or((start, start[2], 0.0));
-    let millimetres = |metres: f64| (metres * 1e4).round() / 10.0;
-    let (geometry, limits) = (&robot.geometry, &robot.limits);
-    let reach = millimetres(geometry.a1 + geometry.a2);
-    let height = |lift: f64| millimetres(geometry.d1 + geometry.d2 - geometry.d4 - lift);
-    let heights = [height(limits.upper[2]), height(limits.lower[2])];
-    let yaw = (to[3].to_degrees() * 10.0).round() / 10.0;
-    let along = |key, label, place: usize| {
-        number(
-            key,
-            label,
-            [-reach, reach],
-            1.0,
-            millimetres(to[place]),
-            "mm",
-        )
-    };
-    Group {
-        title: "Move",
-        hint: None,
-        fields: vec![
-            along("x", "x", 0),
-            along("y", "y", 1),
-            number("z", "z", heights, 1.0, millimetres(to[2]), "mm"),
-            number("yaw", "Yaw", [-360.0, 360.0], 1.0, yaw, "°"),
-            number("top", "Top of a jump", heights, 1.0, millimetres(top), "mm"),
-            number(
-                "clearance",
-                "Clearance",
-                [0.0, 300.0],
-                1.0,
-                millimetres(clearance),
-                "mm",
-            ),
-            number("speed", "Speed", [1.0, 100.0], 1.0, 50.0, "%"),
-        ],
-        buttons: vec![
-            button(
-                "Jump",
-                "jump",
-                &["x", "y", "z", "yaw", "top", "clearance", "speed"],
-            ),
-            button("Line", "line", &["x", "y", "z", "yaw", "speed"]),
-        ],
-    }
 }
 
 fn laws() -> Vec<String> {

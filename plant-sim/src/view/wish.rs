@@ -43,6 +43,18 @@ pub(super) enum Asked {
         z: f64,
         yaw: f64,
         speed: f64,
+        tool_speed: f64,
+    },
+    Arc {
+        via_x: f64,
+        via_y: f64,
+        via_z: f64,
+        x: f64,
+        y: f64,
+        z: f64,
+        yaw: f64,
+        speed: f64,
+        tool_speed: f64,
     },
     /// A small move of one axis from where it stands.
     Jog {
@@ -132,10 +144,29 @@ impl Asked {
                 z,
                 yaw,
                 speed,
+                tool_speed,
             } => request(MotionRequest::MoveLine {
                 target: pose([x, y, z, yaw]),
                 speed: share(speed),
                 posture: Posture::NEAREST,
+                tool_speed: metres(tool_speed),
+            }),
+            &Self::Arc {
+                via_x,
+                via_y,
+                via_z,
+                x,
+                y,
+                z,
+                yaw,
+                speed,
+                tool_speed,
+            } => request(MotionRequest::MoveArc {
+                target: pose([x, y, z, yaw]),
+                via: [via_x, via_y, via_z].map(metres),
+                speed: share(speed),
+                posture: Posture::NEAREST,
+                tool_speed: metres(tool_speed),
             }),
             Self::Hold {} => request(MotionRequest::Hold),
             Self::Operation { operation } => {

@@ -43,6 +43,8 @@ pub enum MotionRequest {
         speed: f32,
         /// Which joint positions at the end. The elbow cannot change its side on the way.
         posture: Posture,
+        /// Greatest speed of the flange, m/s; 0 for as fast as the arm can.
+        tool_speed: f32,
     },
     /// Up, across and down (gate motion).
     Jump {
@@ -95,6 +97,19 @@ pub enum MotionRequest {
     /// In manual operation: moves may go on for another hold time. A sign of life that is repeated as long as a person holds a button;
     /// answered only where it is refused.
     Hold,
+    /// Arc of the tool through three points: from where it is, through `via`, to the target.
+    MoveArc {
+        /// Pose.
+        target: [f32; 4],
+        /// Point on the way, x, y, z.
+        via: [f32; 3],
+        /// Fraction of the joint limits, 0 to 1.
+        speed: f32,
+        /// Which joint positions at the end. The elbow cannot change its side on the way.
+        posture: Posture,
+        /// Greatest speed of the flange, m/s; 0 for as fast as the arm can.
+        tool_speed: f32,
+    },
 }
 
 impl MotionRequest {
@@ -113,6 +128,7 @@ impl MotionRequest {
         (10, "set-override"),
         (11, "set-operation"),
         (12, "hold"),
+        (13, "move-arc"),
     ];
 
     /// Name, lower case with hyphens.
@@ -132,6 +148,7 @@ impl MotionRequest {
             Self::SetOverride { .. } => "set-override",
             Self::SetOperation { .. } => "set-operation",
             Self::Hold => "hold",
+            Self::MoveArc { .. } => "move-arc",
         }
     }
 
@@ -139,7 +156,9 @@ impl MotionRequest {
     #[must_use]
     pub const fn posture(&self) -> Option<Posture> {
         match self {
-            Self::MoveLine { posture, .. } | Self::Jump { posture, .. } => Some(*posture),
+            Self::MoveLine { posture, .. }
+            | Self::MoveArc { posture, .. }
+            | Self::Jump { posture, .. } => Some(*posture),
             _ => None,
         }
     }
@@ -149,7 +168,10 @@ impl MotionRequest {
     pub const fn is_move(&self) -> bool {
         matches!(
             self,
-            Self::MoveJoint { .. } | Self::MoveLine { .. } | Self::Jump { .. }
+            Self::MoveJoint { .. }
+                | Self::MoveLine { .. }
+                | Self::MoveArc { .. }
+                | Self::Jump { .. }
         )
     }
 }
@@ -292,7 +314,7 @@ codes! {
         TooNear = 7, "too-near";
         /// An axis would leave its range.
         JointLimit = 8, "joint-limit";
-        /// The path passes through the stretched arm, where a straight line cannot be followed.
+        /// The path passes through the stretched arm, where a line or an arc cannot be followed.
         Singular = 9, "singular";
         /// The payload is heavier than the robot may carry.
         PayloadTooHeavy = 10, "payload-too-heavy";
@@ -304,7 +326,9 @@ codes! {
         Stopped = 13, "stopped";
         /// The law takes no compensation.
         NoCompensation = 14, "no-compensation";
-        /// A straight line cannot bring the elbow to its other side.
+        /// A line or an arc cannot bring the elbow to its other side.
         ElbowSide = 15, "elbow-side";
+        /// The three points of an arc lie on one line, or two of them coincide.
+        NoCircle = 16, "no-circle";
     }
 }

@@ -33,7 +33,7 @@ impl From<Posture> for [u8; 2] {
 impl TryFrom<[u8; 2]> for Posture {
     type Error = UnknownCode;
 
-    // Out of line: two requests have one.
+    // Out of line: three requests have one.
     #[inline(never)]
     fn try_from([elbow, turn]: [u8; 2]) -> Result<Self, UnknownCode> {
         Ok(Self {

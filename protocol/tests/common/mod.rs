@@ -24,6 +24,10 @@ fn fraction() -> impl Strategy<Value = f32> {
     0.0..=1.0f32
 }
 
+fn tool_speed() -> impl Strategy<Value = f32> {
+    0.0..=100.0f32
+}
+
 pub(crate) fn node() -> impl Strategy<Value = Node> {
     select(Node::ALL)
 }
@@ -90,11 +94,28 @@ pub(crate) fn request() -> impl Strategy<Value = MotionRequest> {
     prop_oneof![
         select(&[R::Enable, R::Disable, R::FaultReset, R::Stop][..]),
         (coordinates(), fraction()).prop_map(|(target, speed)| R::MoveJoint { target, speed }),
-        (coordinates(), fraction(), posture()).prop_map(|(target, speed, posture)| R::MoveLine {
-            target,
-            speed,
-            posture
-        }),
+        (coordinates(), fraction(), posture(), tool_speed()).prop_map(
+            |(target, speed, posture, tool_speed)| R::MoveLine {
+                target,
+                speed,
+                posture,
+                tool_speed
+            }
+        ),
+        (
+            coordinates(),
+            uniform3(-100.0..=100.0f32),
+            fraction(),
+            posture(),
+            tool_speed()
+        )
+            .prop_map(|(target, via, speed, posture, tool_speed)| R::MoveArc {
+                target,
+                via,
+                speed,
+                posture,
+                tool_speed
+            }),
         (
             coordinates(),
             -100.0..=100.0f32,

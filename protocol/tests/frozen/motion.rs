@@ -79,6 +79,7 @@ fn move_line() {
                 target: [0.5, -0.25, 0.125, 3.0],
                 speed: 0.5,
                 posture: Posture::NEAREST,
+                tool_speed: 0.0,
             },
         }),
         5,
@@ -181,6 +182,7 @@ fn move_line_with_a_posture() {
                     elbow: ElbowSide::Negative,
                     turn: WristTurn::MinusOne,
                 },
+                tool_speed: 0.0,
             },
         }),
         5,
@@ -236,5 +238,45 @@ fn hold() {
         7,
         "2C0##1040C000000000000000000000000000000000000000000000000000000000000000000000000000000\
         0000000007CBDE",
+    );
+}
+
+#[test]
+fn move_line_with_a_tool_speed() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::MoveLine {
+                target: [0.5, -0.25, 0.125, 3.0],
+                speed: 0.5,
+                posture: Posture::NEAREST,
+                tool_speed: 0.25,
+            },
+        }),
+        5,
+        "2C0##109050000003F000080BE0000003E000040400000003F00000000803E000000000000000000000000\
+        0000000000053AEC",
+    );
+}
+
+#[test]
+fn move_arc() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::MoveArc {
+                target: [0.5, -0.25, 0.125, 3.0],
+                via: [0.75, 0.5, -0.5],
+                speed: 0.5,
+                posture: Posture {
+                    elbow: ElbowSide::Negative,
+                    turn: WristTurn::MinusOne,
+                },
+                tool_speed: 0.25,
+            },
+        }),
+        5,
+        "2C0##1090D0000003F000080BE0000003E000040400000403F0000003F000000BF0000003F02030000803E\
+        0000000000054876",
     );
 }

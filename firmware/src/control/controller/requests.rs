@@ -44,14 +44,31 @@ impl Controller {
                 self.event(Event::Stop);
                 Answer::Now
             }
-            MotionRequest::MoveJoint { target, speed } => {
-                self.enqueue(sequence, Target::Joints(Vector4::from(*target)), *speed)?
-            }
+            MotionRequest::MoveJoint { target, speed } => self.enqueue(
+                sequence,
+                Target::Joints(Vector4::from(*target)),
+                *speed,
+                0.0,
+            )?,
             MotionRequest::MoveLine {
                 target,
                 speed,
                 posture,
-            } => self.enqueue(sequence, Target::Line(pose(target), *posture), *speed)?,
+                tool_speed,
+            } => {
+                let target = Target::Line(pose(target), *posture);
+                self.enqueue(sequence, target, *speed, *tool_speed)?
+            }
+            MotionRequest::MoveArc {
+                target,
+                via,
+                speed,
+                posture,
+                tool_speed,
+            } => {
+                let target = Target::Arc((*via).into(), pose(target), *posture);
+                self.enqueue(sequence, target, *speed, *tool_speed)?
+            }
             MotionRequest::Jump {
                 target,
                 top,
@@ -65,7 +82,7 @@ impl Controller {
                     top: *top,
                     clearance: *clearance,
                 };
-                self.enqueue(sequence, target, *speed)?
+                self.enqueue(sequence, target, *speed, 0.0)?
             }
             MotionRequest::SetOverride { pace } => {
                 self.queue.set_pace(*pace);
@@ -149,7 +166,13 @@ impl Controller {
         }
     }
 
-    fn enqueue(&mut self, sequence: u8, target: Target, speed: f32) -> Result<Answer, Refusal> {
+    fn enqueue(
+        &mut self,
+        sequence: u8,
+        target: Target,
+        speed: f32,
+        tool_speed: f32,
+    ) -> Result<Answer, Refusal> {
         match self.state {
             // Planned on as soon as it is known where the stop has ended.
             State::Enabled | State::Moving | State::QuickStop => {}
@@ -162,6 +185,7 @@ impl Controller {
             sequence,
             target,
             speed,
+            tool_speed,
         };
         self.queue.push(request)?;
         Ok(Answer::WhenPlanned)

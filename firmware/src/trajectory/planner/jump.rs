@@ -178,7 +178,7 @@ impl Planner {
     /// The profile of one vertical stroke.
     #[inline(never)]
     pub(super) fn stroke(&mut self, budget: &TorqueBudget<'_>, down: bool) {
-        let (Some(jump), Some(lift)) = (&self.jump, &mut self.draft.lift) else {
+        let (Some(jump), Some(lift)) = (&self.jump, self.draft.path.lift()) else {
             return;
         };
         let profile = stroke(jump.height(down) + jump.raise, &jump.bounds(budget, down));
@@ -207,7 +207,7 @@ impl Planner {
         chamfer: Option<Chamfer>,
         lead: f32,
     ) {
-        let (Some(jump), Some(lift)) = (&mut self.jump, &self.draft.lift) else {
+        let (Some(jump), Some(lift)) = (&mut self.jump, self.draft.path.lift()) else {
             return;
         };
         let (travel, stroke) = if down {
@@ -286,7 +286,7 @@ impl Planner {
     /// Strokes and travel in time; whether another height is to be tried.
     #[inline(never)]
     pub(super) fn overlay(&mut self) {
-        let (Some(jump), Some(lift)) = (&mut self.jump, &mut self.draft.lift) else {
+        let (Some(jump), Some(lift)) = (&mut self.jump, self.draft.path.lift()) else {
             return;
         };
         let wanted = self.draft.start + self.draft.profile.duration() + jump.tail;
@@ -322,7 +322,7 @@ fn pace_at(arm1: f32, arm2: f32, elbow: f32) -> f32 {
 /// The greatest way of the tool across per unit of path, m, within the first `height` metres from one end of the path. Along a
 /// straight line in joint space it depends on the cosine of the elbow alone.
 fn pace(arm: &ArmModel, path: &Path, height: f32, from_end: bool) -> f32 {
-    let Path::Joint { start, delta } = path else {
+    let Path::Joint { start, delta, .. } = path else {
         return f32::MAX;
     };
     let arm1 = arm.geometry.a1 * delta.x;

@@ -11,23 +11,20 @@ use crate::trajectory::request::from_path;
 use crate::trajectory::torque_budget::TorqueBudget;
 use crate::trajectory::{Lift, Reference, Trajectory};
 
-/// Most steps of the last pass between the borders of the travel's segments; more along a line, where the joints have extrema of
-/// their own.
+/// Most steps of the last pass between the borders of the travel's segments; more along a curve of the tool, where the joints have extrema
+/// of their own.
 const JOINT_STEPS: u8 = 24;
-pub(super) const LINE_STEPS: u8 = 24;
-/// Least steps along a line while it speeds up, and while it brakes.
-pub(super) const HALF_STEPS: u8 = 12;
-/// Share of the limits of speed, acceleration, jerk and torque rate that the samples of a line may use: there is more between them, and
+/// Share of the limits of speed, acceleration, jerk and torque rate that the samples of such a curve may use: there is more between them, and
 /// of rates they show the mean over a step.
-const LINE_SHARE: f32 = 0.9;
+const TOOL_SHARE: f32 = 0.9;
 /// Further share of those of acceleration and jerk, of a robot that has them.
 const CAP_SHARE: f32 = 0.95;
 
 /// Share of the limits for the samples of this move.
-fn share(draft: &Trajectory) -> f32 {
+pub(super) fn share(draft: &Trajectory) -> f32 {
     match draft.path {
         Path::Joint { .. } => 1.0,
-        Path::Line { .. } => LINE_SHARE,
+        Path::Tool { .. } => TOOL_SHARE,
     }
 }
 
@@ -121,25 +118,30 @@ impl Planner {
             path,
             start,
             profile,
-            lift,
             span,
             ..
         } = &self.draft;
         let steps = match path {
             Path::Joint { .. } => JOINT_STEPS,
-            Path::Line { .. } => LINE_STEPS,
+            Path::Tool { curve, .. } => curve.parts(),
         };
         let mut step = span / f32::from(steps);
-        if matches!(path, Path::Line { .. }) {
-            // One that ends next to the stretched arm brakes within a small part of its time.
-            step = least(step, profile.half_at(t) / f32::from(HALF_STEPS));
+        if matches!(path, Path::Tool { .. }) {
+            // One that ends next to the stretched arm brakes within a small part of its time: at least half as many steps for that, and
+            // for speeding up.
+            step = least(step, profile.half_at(t) / f32::from(steps / 2));
         }
         // A border next to the last sample adds nothing, and rounding must not stall the pass.
         let soon = t + 0.05 * step;
         let mut next = least(t + step, *span);
+        if path.is_arc() && self.apex > soon {
+            next = least(next, self.apex);
+        }
         next = least(next, start + profile.border_after(soon - start));
         // A stroke shorter than that changes the torques of the wrist's motor several times while the travel takes up its own.
-        if let Some(lift) = lift
+        if let Path::Joint {
+            lift: Some(lift), ..
+        } = path
             && profile.is_next_to_rest(soon - start)
         {
             let Lift {

@@ -166,6 +166,7 @@ impl Sense {
         let kind = match motion.request {
             MotionRequest::Jump { .. } => Activity::Jump,
             MotionRequest::MoveLine { .. } => Activity::Line,
+            MotionRequest::MoveArc { .. } => Activity::Arc,
             MotionRequest::MoveJoint { .. } => Activity::Joints,
             _ => return,
         };
@@ -195,7 +196,7 @@ impl Sense {
             Activity::LiftUp => return (self.lift < -MOVING).then_some(0),
             Activity::Cycle => return self.in_cycle.then_some(self.cycles),
             Activity::Move => self.under_way.is_some(),
-            kind @ (Activity::Jump | Activity::Line | Activity::Joints) => {
+            kind @ (Activity::Jump | Activity::Line | Activity::Arc | Activity::Joints) => {
                 self.under_way.is_some_and(|(_, of)| of == kind)
             }
         };

@@ -91,6 +91,8 @@ pub enum Activity {
     Jump,
     /// A line is.
     Line,
+    /// An arc is.
+    Arc,
     /// A move in joint space is.
     Joints,
     /// A cycle of the scenario is.
@@ -102,10 +104,11 @@ pub enum Activity {
 }
 
 /// Those that have names of their own; the others are states of the controller.
-const ACTIVITIES: [(&str, Activity); 7] = [
+const ACTIVITIES: [(&str, Activity); 8] = [
     ("move", Activity::Move),
     ("jump", Activity::Jump),
     ("line", Activity::Line),
+    ("arc", Activity::Arc),
     ("joints", Activity::Joints),
     ("cycle", Activity::Cycle),
     ("lift-down", Activity::LiftDown),

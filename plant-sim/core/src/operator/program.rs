@@ -174,6 +174,14 @@ impl Program {
                 target: line.to.map(|x| x as f32),
                 speed: line.speed as f32,
                 posture: line.posture(),
+                tool_speed: line.tool_speed(),
+            }),
+            Step::Arc(arc) => request(MotionRequest::MoveArc {
+                target: arc.to.map(|x| x as f32),
+                via: arc.via.map(|x| x as f32),
+                speed: arc.speed as f32,
+                posture: arc.posture(),
+                tool_speed: arc.tool_speed(),
             }),
             Step::Joints(joints) => request(MotionRequest::MoveJoint {
                 target: joints.to.map(|x| x as f32),

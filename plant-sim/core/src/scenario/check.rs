@@ -1,6 +1,7 @@
 //! Checks of a scenario before anything runs: ranges, and that the gripper can do what it has to.
 
 mod operation;
+mod place;
 mod requirements;
 
 use std::f64::consts::TAU;
@@ -8,10 +9,9 @@ use std::f64::consts::TAU;
 use firmware::control::laws::{Gains, Selection};
 use protocol::messages::WristTurn;
 use protocol::time::{Duration, Period};
-use toml::de::{DeTable, DeValue};
 
 use super::{
-    GainsSpec, Joints, Jump, Line, MAX_CYCLES, Override, PayloadSpec, Place, Release, Scenario,
+    Arc, GainsSpec, Joints, Jump, Line, MAX_CYCLES, Override, PayloadSpec, Release, Scenario,
     ScenarioError, Step, check_rate,
 };
 use crate::allowed::schema::Each;
@@ -27,6 +27,8 @@ const YAW: Allowed = Allowed::within(-2.0 * TAU, 2.0 * TAU, "rad");
 const JOINT: Allowed = Allowed::within(-20.0, 20.0, "rad");
 /// Of a pose: x, y, z, yaw.
 pub(super) const POSE: Each<4> = Each([LENGTH, LENGTH, LENGTH, YAW]);
+/// Of a point: x, y, z.
+pub(super) const POINT: Each<3> = Each([LENGTH; 3]);
 /// Of joint positions: shoulder, elbow, lift, wrist.
 pub(super) const POSITIONS: Each<4> = Each([JOINT, JOINT, LENGTH, JOINT]);
 pub(super) const RATE: Allowed = Allowed::within(100.0, 10_000.0, "Hz");
@@ -34,6 +36,8 @@ pub(super) const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
 /// At a ten-thousandth a move takes hours; slower ones are meant otherwise.
 const SLOWEST: f64 = 1e-4;
 pub(super) const SPEED: Allowed = Allowed::within(SLOWEST, 1.0, "of full speed");
+/// The slowest takes an hour for 360 mm; no tool of such a robot gets to the fastest.
+pub(super) const TOOL_SPEED: Allowed = Allowed::within(1e-4, 100.0, "m/s");
 const MOVING_PACE: Allowed = Allowed::within(SLOWEST, 1.0, "of the planned speed");
 pub(super) const PACE: Allowed = Allowed::within(0.0, 1.0, "of the planned speed");
 pub(super) const SECONDS: Allowed = Allowed::within(0.0, 3600.0, "s");
@@ -85,7 +89,7 @@ impl Scenario {
                     "after a move, which it stops",
                 );
             }
-            moves |= matches!(step, Step::Jump(_) | Step::Line(_) | Step::Joints(_));
+            moves |= step.is_move();
             match step {
                 Step::Override(Override { to, .. }) => held = (*to == 0.0).then_some(key),
                 // These wait for an arm that has to arrive.
@@ -93,7 +97,11 @@ impl Scenario {
                     findings.held(held.take());
                 }
                 Step::Stop(_) | Step::Estop(_) => held = None,
-                Step::Release(_) | Step::Jump(_) | Step::Line(_) | Step::Joints(_) => {}
+                Step::Release(_)
+                | Step::Jump(_)
+                | Step::Line(_)
+                | Step::Arc(_)
+                | Step::Joints(_) => {}
             }
         }
         findings.held(held);
@@ -261,10 +269,28 @@ impl<'a> Findings<'a> {
                 elbow: _,
                 turn,
                 speed,
+                tool_speed,
             }) => {
-                self.pose(&format!("{key}.line.to"), to);
-                self.turn(&format!("{key}.line.turn"), *turn);
-                self.number(&format!("{key}.line.speed"), *speed, SPEED);
+                let key = format!("{key}.line");
+                self.pose(&format!("{key}.to"), to);
+                self.turn(&format!("{key}.turn"), *turn);
+                self.number(&format!("{key}.speed"), *speed, SPEED);
+                self.tool_speed(&key, *tool_speed);
+            }
+            Step::Arc(Arc {
+                via,
+                to,
+                elbow: _,
+                turn,
+                speed,
+                tool_speed,
+            }) => {
+                let key = format!("{key}.arc");
+                self.numbers(&format!("{key}.via"), via, POINT);
+                self.pose(&format!("{key}.to"), to);
+                self.turn(&format!("{key}.turn"), *turn);
+                self.number(&format!("{key}.speed"), *speed, SPEED);
+                self.tool_speed(&key, *tool_speed);
             }
             Step::Joints(Joints { to, speed }) => {
                 self.numbers(&format!("{key}.joints.to"), to, POSITIONS);
@@ -309,6 +335,12 @@ impl<'a> Findings<'a> {
 
     fn pose(&mut self, key: &str, pose: &[f64; 4]) {
         self.numbers(key, pose, POSE);
+    }
+
+    fn tool_speed(&mut self, key: &str, speed: Option<f64>) {
+        if let Some(speed) = speed {
+            self.number(&format!("{key}.tool_speed"), speed, TOOL_SPEED);
+        }
     }
 
     fn turn(&mut self, key: &str, turn: Option<i8>) {
@@ -358,36 +390,4 @@ impl<'a> Findings<'a> {
             allowed: allowed.into(),
         });
     }
-}
-
-impl Scenario {
-    /// Where the value under a key is said; the last change counts.
-    fn place(&self, key: &str) -> Place {
-        let change = self.changes.iter().rev().find(|change| change.is_of(key));
-        match change {
-            Some(change) => Place::Change(change.said.clone()),
-            None => place(&self.source.text, key)
-                .map_or(Place::Default, |(line, column)| Place::Text(line, column)),
-        }
-    }
-}
-
-/// Line and column of the value under a key such as `cycle[2].jump.to[0]`, if it is in the text: a default is not.
-fn place(toml: &str, key: &str) -> Option<(usize, usize)> {
-    let document = DeTable::parse(toml).ok()?;
-    let mut at = document.span();
-    let mut value: Option<&DeValue<'_>> = None;
-    for word in key.split(['.', '[']) {
-        let next = match word.strip_suffix(']') {
-            Some(index) => value?.as_array()?.get(index.parse::<usize>().ok()?),
-            None => match value {
-                None => document.get_ref().get(word),
-                Some(value) => value.as_table()?.get(word),
-            },
-        };
-        let next = next?;
-        at = next.span();
-        value = Some(next.get_ref());
-    }
-    Some(text::place(toml, at.start))
 }

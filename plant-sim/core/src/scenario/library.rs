@@ -9,7 +9,7 @@ macro_rules! built_in {
 }
 
 /// Scenarios that come with the program: name and text.
-const BUILT_IN: [(&str, &str); 19] = built_in![
+const BUILT_IN: [(&str, &str); 20] = built_in![
     "gate",
     "gate-mismatch",
     "gate-vertical",
@@ -17,6 +17,7 @@ const BUILT_IN: [(&str, &str); 19] = built_in![
     "heavier-load",
     "override",
     "square",
+    "arc",
     "pick-place",
     "palletise",
     "screw",

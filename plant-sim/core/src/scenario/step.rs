@@ -17,6 +17,8 @@ pub enum Step {
     Jump(Jump),
     /// Straight line of the tool.
     Line(Line),
+    /// Arc of the tool through a point.
+    Arc(Arc),
     /// Straight in joint space.
     Joints(Joints),
     /// Wait until the arm has arrived, then this many seconds.
@@ -36,11 +38,20 @@ pub enum Step {
 }
 
 impl Step {
+    /// Whether it asks for a move.
+    pub(crate) fn is_move(&self) -> bool {
+        matches!(
+            self,
+            Self::Jump(_) | Self::Line(_) | Self::Arc(_) | Self::Joints(_)
+        )
+    }
+
     /// Its key.
     pub(crate) fn name(&self) -> &'static str {
         match self {
             Self::Jump(_) => "jump",
             Self::Line(_) => "line",
+            Self::Arc(_) => "arc",
             Self::Joints(_) => "joints",
             Self::Dwell(_) => "dwell",
             Self::Stop(_) => "stop",
@@ -119,6 +130,40 @@ pub struct Line {
     #[serde(default = "full")]
     #[schemars(transform = by(check::SPEED))]
     pub speed: f64,
+    /// Greatest speed of the flange, m/s: 0.25 is what robot programs call 250 mm/s. As fast as the arm can if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = by(check::TOOL_SPEED))]
+    pub tool_speed: Option<f64>,
+}
+
+/// An arc of the tool through three points: from where it is, through `via`, to the end. It is refused where they lie on one line.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Arc {
+    /// Flange on the way: x, y, z (m) in frame 0, anywhere between the ends.
+    #[serde(deserialize_with = "exactly")]
+    #[schemars(transform = by(check::POINT))]
+    pub via: [f64; 3],
+    /// Flange at the end: x, y, z (m) and yaw (rad) in frame 0.
+    #[serde(deserialize_with = "exactly")]
+    #[schemars(transform = by(check::POSE))]
+    pub to: [f64; 4],
+    /// Side to which the elbow bends; an arc is refused where that is not the side before it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elbow: Option<Elbow>,
+    /// Turn of the wrist at the end: whole revolutions of theta4, 0 from -pi to pi; the yaw turns as far as that takes. If
+    /// left out, it turns the shorter way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -WristTurn::MOST, max = WristTurn::MOST))]
+    pub turn: Option<i8>,
+    /// Share of full speed.
+    #[serde(default = "full")]
+    #[schemars(transform = by(check::SPEED))]
+    pub speed: f64,
+    /// Greatest speed of the flange, m/s: 0.25 is what robot programs call 250 mm/s. As fast as the arm can if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = by(check::TOOL_SPEED))]
+    pub tool_speed: Option<f64>,
 }
 
 /// A move to joint positions.
@@ -173,6 +218,28 @@ impl Line {
     pub(crate) fn posture(&self) -> Posture {
         posture(self.elbow, self.turn)
     }
+
+    /// Speed of the tool as the request says it.
+    pub(crate) fn tool_speed(&self) -> f32 {
+        tool_speed(self.tool_speed)
+    }
+}
+
+impl Arc {
+    /// Elbow and turn as the request says them.
+    pub(crate) fn posture(&self) -> Posture {
+        posture(self.elbow, self.turn)
+    }
+
+    /// Speed of the tool as the request says it.
+    pub(crate) fn tool_speed(&self) -> f32 {
+        tool_speed(self.tool_speed)
+    }
+}
+
+/// m/s; 0 for any.
+fn tool_speed(speed: Option<f64>) -> f32 {
+    speed.unwrap_or(0.0) as f32
 }
 
 fn posture(elbow: Option<Elbow>, turn: Option<i8>) -> Posture {
