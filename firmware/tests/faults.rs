@@ -75,9 +75,7 @@ fn latch(latch: Latch) -> &'static str {
 fn seen_by(cause: Cause) -> &'static str {
     match cause {
         Cause::SelfTest => "known answers of mathematics, kinematics and CRC; ranges of the model",
-        Cause::FeedbackLost => {
-            "sample number of the next feedback; axes that have moved several times as far as in a sample"
-        }
+        Cause::FeedbackLost => "sample number of the next feedback",
         Cause::Babbling => {
             "frames that are no message, with no feedback in between; felt where feedback is lost, the drives have let go, or nothing is heard of them"
         }

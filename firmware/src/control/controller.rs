@@ -113,6 +113,8 @@ pub struct Controller {
     limp: bool,
     /// Where the lift is held meanwhile, m; along the path of the stop if it was not at rest.
     lift_held: Option<f32>,
+    /// Whether it is known where the arm was in the last sample.
+    is_placed: bool,
     /// Whether the drives have had torque since enabling.
     drives_on: bool,
     /// Samples in which an axis hardly moved at its torque limit, since the last move began.
@@ -170,6 +172,7 @@ impl Controller {
             fault: Fault::NONE,
             limp: false,
             lift_held: None,
+            is_placed: false,
             drives_on: false,
             alarm: None,
             saturated: 0,
@@ -223,6 +226,7 @@ impl Controller {
             self.watch_at_rest(readings, &q);
             // No torque: follow the arm, so that enabling starts at its present position.
             self.setpoint = Setpoint::rest(q);
+            self.is_placed = true;
             self.queue.clear(&q);
             self.error = Vector4::zeros();
             self.excess = Vector4::zeros();

@@ -4,6 +4,7 @@ use firmware::cabinet::rejoin::Rejoin;
 use firmware::cabinet::sample_clock::SampleClock;
 use firmware::control::controller::Config;
 use firmware::node::Node;
+use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
 use protocol::table;

@@ -196,8 +196,10 @@ impl Controller {
     pub(super) fn watch_at_rest(&mut self, readings: &Readings, q: &Vector4<f32>) {
         let status = readings.status;
         if self.state == State::Ready {
-            let moved = self.setpoint.reference.q - q;
+            // Since the last sample, which may have been the last one under torque.
+            let moved = self.setpoint.reference.q - self.error - q;
             let jump = self.monitor.jumped(&moved, readings.steps);
+            let jump = jump.filter(|_| self.is_placed);
             if let Some(fault) = Monitor::status(status, false).or(jump) {
                 self.fail(fault);
             }
