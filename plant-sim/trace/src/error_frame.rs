@@ -127,6 +127,10 @@ impl fmt::Display for ErrorFrame {
             write!(f, "{separator}{name}{details}")?;
             separator = ", ";
         }
+        // Before Linux 6.0 counters had no class.
+        if self.class & COUNTERS == 0 && self.data[6..] != [0, 0] {
+            write!(f, ", {}{}", CLASSES[9], self.details(COUNTERS))?;
+        }
         Ok(())
     }
 }

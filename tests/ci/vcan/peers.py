@@ -6,9 +6,11 @@ frames faster than programs read them, so each receiver gets room for all of the
 
 import fcntl
 import glob
+import json
 import os
 import pty
 import random
+import re
 import signal
 import socket
 import struct
@@ -45,6 +47,7 @@ def main():
     cansend_to_ours()
     canplayer_to_record(mixed)
     losses_of_record()
+    errors_to_candump()
     slcand_to_ours_and_back()
 
 
@@ -112,6 +115,29 @@ def canplayer_to_record(log):
     recorded = [frame for path in files for frame in read_log(path)]
     assert recorded == frames, "the recording holds other frames than canplayer sent"
     print(f"ok: record has the {len(frames)} frames of canplayer, in {len(files)} files")
+
+
+def errors_to_candump():
+    """candump says what the error frames of a bus-off are, as our own decoder does."""
+    errors = f"{WORK}/errors.log"
+    with open(f"{WORK}/bus-off/trace.log") as source, open(errors, "w") as sink:
+        sink.writelines(line for line in source if line.split()[2].startswith("2000") and line.split()[2][8:9] == "#")
+    decoded = subprocess.run([PLANT_SIM, "trace", "decode", "--format", "jsonl", errors], stdout=subprocess.PIPE, check=True)
+    ours = [json.loads(line)["error"] for line in decoded.stdout.splitlines()]
+    before = sockets("vcan0")
+    candump = subprocess.Popen(
+        ["candump", "-e", "-n", str(len(ours)), "vcan0,0:0,#FFFFFFFF"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    await_true("candump", lambda: sockets("vcan0") > before)
+    subprocess.run(["canplayer", "-I", errors, "vcan0=can0"], check=True)
+    said = candump.communicate(timeout=LIMIT)[0]
+    assert "invalid" not in said, said
+    theirs = [part.replace("\n\t", ",") for part in re.split(r"^.*ERRORFRAME", said, flags=re.M)[1:]]
+    words = [set(re.findall(r"[a-z0-9]+(?:-[a-z0-9]+)*", text)) - {"at", "tx", "rx"} for text in theirs]
+    for our, their in zip(ours, words, strict=True):
+        wanted = set(re.findall(r"[a-z0-9]+(?:-[a-z0-9]+)*", our)) - {"at", "tx", "rx"}
+        assert wanted == their, (our, their)
+    print(f"ok: candump -e reads {len(ours)} error frames as plant-sim does")
 
 
 def losses_of_record():

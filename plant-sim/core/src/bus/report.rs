@@ -14,7 +14,6 @@ const NO_ACKNOWLEDGEMENT: u32 = 1 << 5;
 const BUS_OFF: u32 = 1 << 6;
 const BUS_ERROR: u32 = 1 << 7;
 const RESTARTED: u32 = 1 << 8;
-const COUNTERS: u32 = 1 << 9;
 
 /// Byte 1.
 const RX_WARNING: u8 = 1 << 2;
@@ -71,7 +70,7 @@ impl Report {
     pub fn error_frame(&self, node: u8) -> ErrorFrame {
         let mut data = [0; 8];
         data[5] = node;
-        let mut class = match self.what {
+        let class = match self.what {
             Noticed::Error {
                 kind,
                 field,
@@ -106,12 +105,12 @@ impl Report {
             }
             Noticed::Recovered => RESTARTED,
         };
-        // A counter of 256 fits no byte.
+        // A counter of 256 fits no byte. Their class (CAN_ERR_CNT, Linux 6.0) is left out: can-utils of before call the whole frame invalid for it,
+        // and those of today show counters without it as well, unless both are 0.
         if let (Ok(transmit), Ok(receive)) = (
             u8::try_from(self.counters.transmit()),
             u8::try_from(self.counters.receive()),
         ) {
-            class |= COUNTERS;
             data[6..].copy_from_slice(&[transmit, receive]);
         }
         ErrorFrame::new(class, &data).expect("eight bytes")
