@@ -3,6 +3,7 @@
 
 #![allow(clippy::expect_used, reason = "a build fails by panicking")]
 
+use std::env;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -37,13 +38,12 @@ fn main() {
     }
 }
 
-/// The folder of the workspace.
+/// The folder of the workspace. As it is now: the script may have been compiled where the sources were before.
 fn root() -> PathBuf {
-    let mut folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    while !folder.join("Cargo.lock").exists() {
-        folder = folder.parent().expect("a package of the workspace");
-    }
-    folder.into()
+    let package = env::var("CARGO_MANIFEST_DIR").expect("cargo runs this");
+    let mut folders = Path::new(&package).ancestors();
+    let root = folders.find(|folder| folder.join("Cargo.lock").exists());
+    root.expect("a package of the workspace").into()
 }
 
 /// Commit and its date; none without git, or if the sources are not a repository or are inside another one.
