@@ -319,10 +319,9 @@ fn results_of_another_plan_do_not_belong_here() {
     fs::write(bench.path("cases.toml"), other).unwrap();
     bench.keep("plan.jsonl", &["plan", "--cases", "cases.toml"], 0);
     bench.run("1/2", "second", &[]);
-    bench.refused(
-        &["merge", "first", "second"],
-        "results of another plan than",
-    );
+    for command in ["merge", "missing"] {
+        bench.refused(&[command, "first", "second"], "of another plan than");
+    }
     fs::rename(bench.path("first"), bench.path("out")).unwrap();
     let again = "run plan.jsonl --shard 0/2 --out out --resume".split(' ');
     bench.refused(&again.collect::<Vec<_>>(), "results of another plan");

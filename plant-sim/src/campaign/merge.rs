@@ -38,19 +38,26 @@ pub fn merge(folders: &[PathBuf], sink: &mut impl Write) -> Result<(), CampaignE
     };
     let (header, path) = (first.header().clone(), first.path());
     for other in &sources {
-        let found = other.header();
-        let what = if !found.is_of_plan_of(&header) {
-            "these are results of another plan than"
-        } else if found.build != header.build {
-            "these are results of another build of the program than"
-        } else {
-            continue;
-        };
-        let what = format!("{what} {}; merge those of one only", path.display());
-        return Err(CampaignError::wrong(other.path(), what));
+        belong_together((&header, path), (other.header(), other.path()))?;
     }
     let failed = CampaignError::write(Path::new("standard output"));
     put_together(header, sources, sink, failed)
+}
+
+/// Whether two files have results of one plan and one build of the program.
+fn belong_together(
+    (header, path): (&ShardHeader, &Path),
+    (found, other): (&ShardHeader, &Path),
+) -> Result<(), CampaignError> {
+    let what = if !found.is_of_plan_of(header) {
+        "these are results of another plan than"
+    } else if found.build != header.build {
+        "these are results of another build of the program than"
+    } else {
+        return Ok(());
+    };
+    let what = format!("{what} {}; take those of one only", path.display());
+    Err(CampaignError::wrong(other, what))
 }
 
 fn put_together(
@@ -146,9 +153,10 @@ fn nothing(folders: &[PathBuf]) -> CampaignError {
 /// Shards without complete and valid results, as a job array takes them: `1,3-5`; empty where nothing is missing.
 ///
 /// # Errors
-/// There are no results, so that the number of shards is unknown, or those of different numbers are mixed.
+/// There are no results, so that the number of shards is unknown, or those of different numbers, plans or builds are mixed.
 pub fn missing(folders: &[PathBuf]) -> Result<String, CampaignError> {
     let mut of = None;
+    let mut first: Option<(ShardHeader, PathBuf)> = None;
     let mut complete = BTreeSet::new();
     for (path, shard) in files(folders)? {
         let Shard { part, of: number } = shard;
@@ -161,8 +169,12 @@ pub fn missing(folders: &[PathBuf]) -> Result<String, CampaignError> {
         match read(&path, shard) {
             Err(damaged @ CampaignError::Damaged { .. }) => say!("{damaged}"),
             other => {
-                other?;
+                let header = other?;
                 complete.insert(part);
+                match &first {
+                    Some((one, at)) => belong_together((one, at), (&header, &path))?,
+                    None => first = Some((header, path)),
+                }
             }
         }
     }
@@ -170,11 +182,11 @@ pub fn missing(folders: &[PathBuf]) -> Result<String, CampaignError> {
     Ok(ranges((0..of).filter(|part| !complete.contains(part))))
 }
 
-/// Reads results to their end.
-fn read(path: &Path, shard: Shard) -> Result<(), CampaignError> {
+/// Reads results to their end, and returns their header.
+fn read(path: &Path, shard: Shard) -> Result<ShardHeader, CampaignError> {
     let mut reader = Reader::open(path, shard)?;
     while reader.advance()?.is_some() {}
-    Ok(())
+    Ok(reader.header().clone())
 }
 
 /// Rising numbers as `1,3-5`.
