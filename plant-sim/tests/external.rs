@@ -185,12 +185,14 @@ fn example(kind: &Kind) -> String {
     format!("{place}{axis}:{}{value}@{window}", kind.name)
 }
 
-/// What differs with an external controller in lock-step: its time stands still where no feedback arrives, and nobody tells it of a
+/// What differs with an external controller in lock-step: its time stands still where no feedback arrives that it can read, and nobody tells it of a
 /// bus-off of the simulated bus. As docs/faults.md says.
-const DIFFERENT: [&str; 15] = [
+const DIFFERENT: [&str; 17] = [
     "loss",
     "delay",
     "jitter",
+    "corrupt",
+    "bad-value",
     "bit-error",
     "stuff-error",
     "form-error",

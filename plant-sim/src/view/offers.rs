@@ -252,7 +252,10 @@ fn faults() -> Vec<Breakage> {
 
 fn places(kind: &Kind) -> Vec<String> {
     match kind.place {
-        "message" => TABLE.iter().map(|info| info.name.to_lowercase()).collect(),
+        "message" => {
+            let messages = TABLE.iter().filter(|info| kind.acts_on(info));
+            messages.map(|info| info.name.to_lowercase()).collect()
+        }
         "node" => Node::ALL.iter().map(ToString::to_string).collect(),
         part if kind.has_axis => AXES.iter().map(|axis| format!("{part}:{axis}")).collect(),
         part => vec![part.to_owned()],

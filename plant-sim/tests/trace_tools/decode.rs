@@ -79,6 +79,6 @@ fn what_is_no_message_is_shown_raw() {
         (get(2, "id"), get(2, "raw")),
         ("20000040", "0100000000000002")
     );
-    assert_eq!(get(2, "error"), "bus-off");
+    assert_eq!(get(2, "error"), "bus-off, error-counter-tx-rx (tx 0, rx 2)");
     assert_eq!(get(2, "interface"), "a\"b,c");
 }

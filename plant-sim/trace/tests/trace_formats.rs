@@ -112,12 +112,6 @@ fn errors_are_said_in_words() {
             [0, 0x30, 0, 0, 0, 0, 130, 7],
             "controller-problem (rx-error-passive, tx-error-passive), error-counter-tx-rx (tx 130, rx 7)",
         ),
-        // Before Linux 6.0.
-        (
-            0x004,
-            [0, 0x20, 0, 0, 0, 0, 128, 0],
-            "controller-problem (tx-error-passive), error-counter-tx-rx (tx 128, rx 0)",
-        ),
         (
             0x088,
             [0, 0, 0x84, 0x19, 0, 0, 0, 0],

@@ -1,5 +1,11 @@
 //! The kinds of faults: a row for each, as people write it and read about it.
 
+use protocol::schema::MessageInfo;
+
+use super::frames::real_number;
+
+const BAD_VALUE: &str = "bad-value";
+
 /// A kind of fault, as people write it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kind {
@@ -15,6 +21,13 @@ pub struct Kind {
     pub second: Option<Value>,
     /// What it does.
     pub about: &'static str,
+}
+
+impl Kind {
+    /// Whether this kind, of a message, can act on that one.
+    pub fn acts_on(&self, info: &MessageInfo) -> bool {
+        self.name != BAD_VALUE || real_number(info).is_some()
+    }
 }
 
 /// A number that a kind takes.
@@ -127,7 +140,7 @@ pub const KINDS: [Kind; 42] = [
     of_message("jitter", Some(SECONDS), "the frame is late by a random time up to this"),
     of_message("duplicate", None, "the frame is sent twice"),
     of_message("corrupt", Some(SHARE), "one bit is wrong inside the node, so that the CRC of the bus is right"),
-    of_message("bad-value", Some(SHARE), "its first real number is none (NaN): the arithmetic of the node is wrong, and every CRC right"),
+    of_message(BAD_VALUE, Some(SHARE), "its first real number is none (NaN): the arithmetic of the node is wrong, and every CRC right"),
     of_message("replay", Some(Value { default: Some(1.0), ..whole(1.0, 64.0, "frames") }),
         "the frame is the one sent so many frames before"),
     of_message("masquerade", None, "a foreign node sends the message once a sample, without its end-to-end protection"),

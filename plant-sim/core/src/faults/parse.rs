@@ -4,7 +4,6 @@ use protocol::messages::Node;
 use protocol::schema::MessageInfo;
 use protocol::table::TABLE;
 
-use super::frames::real_number;
 use super::kinds::{KINDS, Kind, Value};
 use super::{Disguise, Fault, FrameFault, What, Window};
 use crate::bus::{ErrorKind, Level};
@@ -90,7 +89,15 @@ fn what_of(text: &str) -> Result<What, String> {
     let value = number(kind.name, kind.value, value)?;
     let second = number(kind.name, kind.second, second)?;
     if let (Some(info), None) = (message, node) {
-        return of_message(info, kind.name, value, second);
+        if !kind.acts_on(info) {
+            let with = TABLE.iter().filter(|info| kind.acts_on(info));
+            let names: Vec<_> = with.map(|info| info.name).collect();
+            let (name, names) = (info.name, names.join(", "));
+            return Err(format!(
+                "not every {name} has a real number in it; allowed: {names}"
+            ));
+        }
+        return Ok(of_message(info, kind.name, value, second));
     }
     if let Some(node) = node {
         return of_node(node, kind.name, value);
@@ -120,15 +127,10 @@ fn what_of(text: &str) -> Result<What, String> {
     })
 }
 
-fn of_message(
-    info: &'static MessageInfo,
-    kind: &str,
-    value: f64,
-    second: f64,
-) -> Result<What, String> {
+fn of_message(info: &'static MessageInfo, kind: &str, value: f64, second: f64) -> What {
     let frames = |fault| What::Frames(info, fault);
     let attempts = |error| What::Attempts(info, error, value);
-    Ok(match kind {
+    match kind {
         "loss" => frames(FrameFault::Loss(value)),
         "burst" => frames(FrameFault::Burst(value, second)),
         "reorder" => frames(FrameFault::Reorder(value)),
@@ -136,15 +138,6 @@ fn of_message(
         "jitter" => frames(FrameFault::Jitter(value)),
         "duplicate" => frames(FrameFault::Duplicate),
         "corrupt" => frames(FrameFault::Corrupt(value)),
-        "bad-value" if real_number(info).is_none() => {
-            let with = TABLE.iter().filter(|info| real_number(info).is_some());
-            let names: Vec<_> = with.map(|info| info.name).collect();
-            let names = names.join(", ");
-            return Err(format!(
-                "not every {} has a real number in it; allowed: {names}",
-                info.name
-            ));
-        }
         "bad-value" => frames(FrameFault::BadValue(value)),
         "replay" => frames(FrameFault::Replay(value as usize)),
         "masquerade" => What::Foreign(info, Disguise::Poor),
@@ -154,7 +147,7 @@ fn of_message(
         "form-error" => attempts(ErrorKind::Form),
         "crc-error" => attempts(ErrorKind::Crc),
         _ => attempts(ErrorKind::Ack),
-    })
+    }
 }
 
 fn of_node(node: Node, kind: &str, value: f64) -> Result<What, String> {
