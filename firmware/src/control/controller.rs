@@ -333,9 +333,8 @@ impl Controller {
         if self.built_up >= 1.0 {
             return torque;
         }
-        let share = self.built_up;
         self.built_up += 2.0 * self.period / self.setup.brake_delay;
-        torque * share
+        torque * clamp(self.built_up, 0.0, 1.0)
     }
 
     /// Forgets what law and observer have gathered.
