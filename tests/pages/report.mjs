@@ -107,7 +107,14 @@ async function requirementsLeadToTheirMoments(page, folder, table = "Requirement
     }
     await page.getByLabel("What the charts show").selectOption({ label: "Whole run" });
     for (const name of new Set(requirements.map(({ met }) => (met ? "good" : "bad")))) {
-        const { count } = middle(await pixels(page, "State of the controller over time"), await rgb(page, name));
+        const paint = await rgb(page, name);
+        const painted = async () => middle(await pixels(page, "State of the controller over time"), paint).count;
+        // A chart is drawn with the next frame, which may be late on a busy machine.
+        let count = 0;
+        for (let tries = 0; count <= 10 && tries < 100; tries++) {
+            count = await painted();
+            await page.waitForTimeout(50);
+        }
         check(count > 10, `${count} pixels of a wedge in the colour ${name}`);
     }
 }
