@@ -178,8 +178,7 @@ impl Controller {
         };
         let status = readings.status;
         if event == Event::BrakeClosed && status.contains(DriveStatus::BRAKE_RELEASED) {
-            let status = f32::from(status.bits());
-            let fault = Fault::value(Cause::DriveFault, status, 0.0);
+            let fault = open_brake(status);
             self.fail(fault);
             if self.unheld == 0 {
                 // Told once, also where it changes nothing.
@@ -212,8 +211,7 @@ impl Controller {
         self.unheld = before.saturating_add(readings.steps);
         let limit = self.brake_samples();
         if self.unheld >= limit && (before < limit || self.state == State::Ready) {
-            let status = f32::from(status.bits());
-            self.fail(Fault::value(Cause::DriveFault, status, 0.0));
+            self.fail(open_brake(status));
         }
     }
 
@@ -227,6 +225,11 @@ impl Controller {
     pub fn control_word(&self) -> ControlWord {
         self.state.control_word()
     }
+}
+
+/// The fault of a brake that is open where it should hold, with what the drives say.
+fn open_brake(status: DriveStatus) -> Fault {
+    Fault::value(Cause::DriveFault, f32::from(status.bits()), 0.0)
 }
 
 /// Whether a fault concerns an axis of the arm, and not the shaft that the brake holds.
