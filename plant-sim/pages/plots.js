@@ -30,7 +30,10 @@ class Plots {
         const { left, width } = plot.bbox;
         const ratio = devicePixelRatio;
         const context = plot.ctx;
-        const place = (t) => Math.min(Math.max(plot.valToPos(t, "x", true), left), left + width);
+        const at = (t) => plot.valToPos(t, "x", true);
+        const place = (t) => Math.min(Math.max(at(t), left), left + width);
+        // What is outside of the times that are shown has no mark: it would lie on others at the edge.
+        const shown = (t) => at(t) >= left && at(t) <= left + width;
         Object.assign(context, { font: `${11 * ratio}px system-ui, sans-serif`, textAlign: "left", textBaseline: "middle" });
         for (const { name, from, to } of run.states) {
             const [start, end] = [place(from), place(to)];
@@ -42,12 +45,12 @@ class Plots {
             }
         }
         context.fillStyle = colour("ink");
-        run.drawing.cycles.forEach((t) => context.fillRect(place(t), top, ratio, height / 4));
+        run.drawing.cycles.filter(shown).forEach((t) => context.fillRect(at(t), top, ratio, height / 4));
         context.fillStyle = colour("alarm");
-        run.faults.forEach(({ time_s: t }) => context.fillRect(place(t) - ratio, top, 3 * ratio, height));
+        run.faults.filter(({ time_s: t }) => shown(t)).forEach(({ time_s: t }) => context.fillRect(at(t) - ratio, top, 3 * ratio, height));
         for (const { met, time_s: t } of run.results.requirements) {
-            if (t !== null) {
-                this.wedge(context, place(t), top + height, 5 * ratio, colour(met ? "good" : "bad"));
+            if (t !== null && shown(t)) {
+                this.wedge(context, at(t), top + height, 5 * ratio, colour(met ? "good" : "bad"));
             }
         }
     }

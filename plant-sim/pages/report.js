@@ -31,6 +31,8 @@ function report() {
         return t !== null;
     };
     addEventListener("hashchange", follow);
+    // A link to where the page already is changes nothing that the browser would tell.
+    addEventListener("click", ({ target }) => target.closest?.("a")?.href === location.href && follow());
     if (!follow() && motionAllowed()) {
         board.player.play(true);
     }
