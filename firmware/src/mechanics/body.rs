@@ -14,7 +14,7 @@ pub type Torques = Vector5<f32>;
 
 /// Share of the torque that a plan may use. The rest is for feedback control: payload and friction are never known
 /// exactly, and a saturated axis leaves the path.
-pub const TORQUE_SHARE: f32 = 0.945;
+pub const TORQUE_SHARE: f32 = 0.95;
 
 /// Everything that depends on the payload, lumped once instead of in every tick.
 #[derive(Clone, Copy, Debug, Default)]

@@ -39,7 +39,7 @@ use survey::Apex;
 use verify::Before;
 
 /// Corrections of the accelerations.
-const ROUNDS: u8 = 2;
+const ROUNDS: u8 = 3;
 /// Samples of each half of the profile in one round.
 const BALANCE_POINTS: u8 = 3;
 /// Largest factor by which one sample of a round changes an acceleration.

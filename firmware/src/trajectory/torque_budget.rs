@@ -13,10 +13,10 @@ use crate::mechanics::kinematics::Trig;
 use crate::mechanics::math::{cbrt, clamp, least};
 
 /// Share of the torque's rate of change that a profile may use. The rest is for what lies between two samples.
-const RATE_SHARE: f32 = 0.935;
+const RATE_SHARE: f32 = 0.95;
 
 /// The same for the mean over a step of the last pass; above it, so that this pass does not slow down what just keeps it.
-const VERIFIED_RATE: f32 = 0.939;
+const VERIFIED_RATE: f32 = 0.954;
 /// Share of the torque's rate of change that a stop may use: the move's own change keeps the rest.
 pub(super) const STOP_SHARE: f32 = 0.5;
 /// The same for another pace, which nobody needs at once: what a plan leaves.
@@ -261,16 +261,19 @@ impl TorqueBudget<'_> {
     }
 
     /// Bounds of a vertical stroke of a jump, up or down, over at most `height` m. Friction takes from the force that speeds
-    /// up; it never adds to the one that brakes.
+    /// up, and adds to the one that brakes, the more the faster it goes.
     #[inline(never)]
     pub fn lift(&self, height: f32, down: bool) -> Bounds {
         let limits = &self.arm.limits;
         let mass = self.body.nominal_inertia.z;
         let gravity = self.body.lagrange.gravity().z;
         let force = self.body.planned_torque.z;
-        let cap = limits.acceleration.z.min((force + gravity.abs()) / mass);
         let coulomb = self.arm.drive.coulomb.z;
         let viscous = self.arm.drive.viscous.z;
+        let cap = limits
+            .acceleration
+            .z
+            .min((force + gravity.abs() + coulomb) / mass);
         // Strokes that the drive cannot hold have been refused: this keeps the bound positive for one close to the
         // limit.
         let within = |force: f32| clamp(force / mass, 0.01 * cap, cap);
@@ -282,25 +285,33 @@ impl TorqueBudget<'_> {
             .min((rate - viscous * cap).max(0.1 * rate) / mass);
         // Gravity is negative: upwards is against it.
         let weight = if down { gravity } else { -gravity };
-        let lifting = force - weight - coulomb;
-        let (up, back) = (within(lifting), within(force + weight));
-        // The peak speed without ramps, or a little more: from the greatest, by steps towards a square root.
+        let (lifting, braking) = (force - weight - coulomb, force + weight + coulomb);
+        let (up, back) = (within(lifting), within(braking));
+        // The peak speed of these accelerations over the height, or a little more: from the greatest, by steps towards the root of a
+        // parabola.
         let speed = self.speed().z;
-        let squared = 2.0 * height * up * back / (up + back);
+        let square = 0.5 / up + 0.5 / back;
+        let linear = 0.5 * (up + back) / jerk;
         let mut peak = speed;
-        for _ in 0..3 {
-            peak = peak.min(0.5 * (peak + squared / peak));
+        for _ in 0..4 {
+            peak = peak.min((square * peak * peak + height) / (2.0 * square * peak + linear));
         }
-        let lost = viscous * peak;
+        // Speed that a ramp to or from an acceleration takes, and what friction is at the speed before one.
+        let ramp = |acceleration: f32| 0.5 * acceleration * acceleration / jerk;
+        let at_speed = |acceleration: f32| viscous * (peak - ramp(acceleration)).max(0.0);
         Bounds {
             speed,
             jerk,
             accelerate: HalfBounds {
                 jerk,
-                slow: up,
-                fast: within(lifting - lost),
+                slow: within(lifting - viscous * ramp(up).min(peak)),
+                fast: within(lifting - at_speed(up)),
             },
-            brake: HalfBounds::even(back, jerk),
+            brake: HalfBounds {
+                jerk,
+                slow: back,
+                fast: within(braking + at_speed(back)),
+            },
         }
     }
 }
