@@ -35,7 +35,7 @@ const SAMPLES_TO_REPORT: u32 = 4;
 /// Samples from a report until the brake is told at the latest: the drives hold a command for 5 samples, and a stop that an axis does
 /// not follow is given up at the 4th sample.
 const SAMPLES_TO_BRAKE: f64 = 8.0;
-/// For a stop that uses 0.945 of the torque, builds it up at half its rate, and has more axes to stop than one.
+/// For a stop that uses 0.95 of the torque, builds it up at half its rate, and has more axes to stop than one.
 const STOP_MARGIN: f64 = 1.25;
 /// The brake closes within this, s.
 const BRAKE_S: f64 = 0.03;
