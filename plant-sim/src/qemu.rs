@@ -333,6 +333,12 @@ impl Peer for Qemu {
         Ok(self.twin.bus_off(now))
     }
 
+    fn took(&mut self, time: Duration) -> Result<(), PeerError> {
+        self.board.send_request(&Request::Took(time))?;
+        self.twin.took(time);
+        Ok(())
+    }
+
     fn finish(&mut self) -> Result<(), PeerError> {
         self.catch_up(0)
     }

@@ -57,6 +57,11 @@ impl Twin {
         self.controller.bus_off(now)
     }
 
+    /// Tells the twin, as the other, how long its answer to the last call has taken.
+    pub fn took(&mut self, time: Duration) {
+        self.controller.took(time);
+    }
+
     /// Compares a frame of the other with the next one expected.
     ///
     /// # Errors

@@ -167,7 +167,7 @@ fn a_controller_that_goes_away_is_a_result() {
 fn example(kind: &Kind) -> String {
     let place = match kind.place {
         "message" => "feedback",
-        "node" if kind.name == "no-recovery" => "controller",
+        "node" if matches!(kind.name, "no-recovery" | "slow") => "controller",
         "node" => "drives",
         place => place,
     };
@@ -186,8 +186,8 @@ fn example(kind: &Kind) -> String {
 }
 
 /// What differs with an external controller in lock-step: its time stands still where no feedback arrives that it can read, and nobody tells it of a
-/// bus-off of the simulated bus. As docs/faults.md says.
-const DIFFERENT: [&str; 17] = [
+/// bus-off of the simulated bus, nor that it is slow. As docs/faults.md says.
+const DIFFERENT: [&str; 18] = [
     "loss",
     "delay",
     "jitter",
@@ -200,6 +200,7 @@ const DIFFERENT: [&str; 17] = [
     "ack-error",
     "silent",
     "dead",
+    "slow",
     "babbling",
     "no-recovery",
     "dominant",
@@ -259,11 +260,14 @@ fn every_kind_of_fault_acts_on_an_external_controller() {
 #[test]
 fn what_cannot_break_an_external_controller_is_refused_by_name() {
     let lock_step = "an external controller has a power supply of its own; allowed: controller:silent, or --controller qemu";
+    let processor = "an external controller has a processor of its own; allowed: command:delay, or --controller qemu";
     let real_time =
         "in real time samples are taken by the clock of this machine; allowed without --real-time";
     for (fault, options, why) in [
         ("controller:dead@0.4s..0.5s", &[][..], lock_step),
         ("controller:dead@0.4s..0.5s", &["--real-time"], lock_step),
+        ("controller:slow=0.002@0.4s", &[], processor),
+        ("controller:slow=0.002@0.4s", &["--real-time"], processor),
         ("clock:drift=0.01@0.4s", &["--real-time"], real_time),
         ("clock:misses@0.4s", &["--real-time"], real_time),
     ] {

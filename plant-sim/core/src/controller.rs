@@ -95,6 +95,13 @@ impl InProcess {
         self.rejoin.after_bus_off(now)
     }
 
+    /// Tells the node how long its answer to the last call has taken: the next sample was due meanwhile, or not.
+    pub fn took(&mut self, time: Duration) {
+        if time > self.config.period.duration() {
+            self.node.count_overrun();
+        }
+    }
+
     /// Calls the node at the caller's time `now`; appends the frames that it sends. A node that has to reset is
     /// replaced by a new one.
     pub fn call(&mut self, now: Instant, received: Option<&CanFrame>, sent: &mut Vec<CanFrame>) {
@@ -155,5 +162,10 @@ impl Peer for InProcess {
 
     fn bus_off(&mut self, now: Instant) -> Result<Duration, PeerError> {
         Ok(Self::bus_off(self, now))
+    }
+
+    fn took(&mut self, time: Duration) -> Result<(), PeerError> {
+        Self::took(self, time);
+        Ok(())
     }
 }

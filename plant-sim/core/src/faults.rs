@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Four parts of a run carry them out, each as long as the [`Window`] is open. A wrapper around each node ([`Faulty`]) changes
-//! the frames that the node sends, and takes its power; a peer without frames ([`Injector`]) breaks parts of the robot and
+//! the frames that the node sends, and takes its power and its time; a peer without frames ([`Injector`]) breaks parts of the robot and
 //! repairs them; a foreign node ([`Impostor`]) sends frames that are not its own; the bus itself has the errors that CAN
 //! controllers find ([`Rig::spoil`](crate::rig::Rig::spoil)). All are seeded, so a run with faults repeats to the byte. The
 //! controller is not informed.
@@ -69,6 +69,8 @@ pub enum What {
     Silent(Node),
     /// The node has no power, and starts anew when it has.
     Dead(Node),
+    /// The controller needs so much longer for a sample, s.
+    Slow(f64),
     /// The node's CAN controller sends the frame of the highest priority whenever it can.
     Babbling(Node),
     /// Attempts to send one message, on the bus: this error, in this share of them.

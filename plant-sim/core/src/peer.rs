@@ -44,6 +44,15 @@ pub trait Peer {
         Ok(Duration::ZERO)
     }
 
+    /// Its answer to the last call has taken so long. A peer that has a clock of its own for that needs not be told.
+    ///
+    /// # Errors
+    /// Those of [`Peer::poll`].
+    fn took(&mut self, time: Duration) -> Result<(), PeerError> {
+        let _ = time;
+        Ok(())
+    }
+
     /// Checks what it has left for later. The run has ended.
     ///
     /// # Errors
@@ -83,6 +92,10 @@ impl<P: Peer + ?Sized> Peer for &mut P {
         (**self).bus_off(now)
     }
 
+    fn took(&mut self, time: Duration) -> Result<(), PeerError> {
+        (**self).took(time)
+    }
+
     fn finish(&mut self) -> Result<(), PeerError> {
         (**self).finish()
     }
@@ -106,6 +119,10 @@ impl<P: Peer + ?Sized> Peer for Rc<RefCell<P>> {
 
     fn bus_off(&mut self, now: Instant) -> Result<Duration, PeerError> {
         self.borrow_mut().bus_off(now)
+    }
+
+    fn took(&mut self, time: Duration) -> Result<(), PeerError> {
+        self.borrow_mut().took(time)
     }
 
     fn finish(&mut self) -> Result<(), PeerError> {

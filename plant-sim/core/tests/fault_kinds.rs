@@ -340,6 +340,32 @@ fn a_dip_of_a_drive_is_reported_by_it() {
     }
 }
 
+/// By hand: with 2 ms for each sample of 1 ms every answer is a millisecond later than the one before it. The fifth that is late stops the arm. With
+/// half a millisecond each is in time for the next sample.
+#[test]
+fn a_slow_controller_answers_later_and_later() {
+    let times = |record: &Record| -> Vec<f64> {
+        let commands = record.frames.iter();
+        let commands = commands.filter(|(_, frame)| table::COMMAND.identifies(frame));
+        let times = commands.map(|(time, _)| time.seconds());
+        times.filter(|time| *time > 0.4).collect()
+    };
+    let (_, sound) = gate("payload:heavier=0@0s");
+    let (summary, slow) = gate("controller:slow=0.002@0.4s");
+    assert_eq!(cause(&slow), Cause::Overrun);
+    assert!(!summary.completed && summary.at_rest);
+    let late = times(&slow).into_iter().zip(times(&sound));
+    for (number, (slow, sound)) in (0..5).zip(late) {
+        // Give or take what another frame on the bus takes.
+        let late = slow - sound - 2e-3 - 1e-3 * f64::from(number);
+        assert!(late.abs() < 0.2e-3, "{number}: {late}");
+    }
+    let (summary, in_time) = gate("controller:slow=0.0005@0.4s");
+    assert!(summary.completed, "{:?}", summary.error);
+    let first = |record: &Record| times(record)[0];
+    assert!((first(&in_time) - first(&sound) - 0.5e-3).abs() < 0.2e-3);
+}
+
 /// All that is protected is right: only the range of the number is not.
 #[test]
 fn a_bad_value_is_the_only_thing_that_is_wrong() {

@@ -25,7 +25,7 @@ use firmware::node::Node;
 use protocol::bus::{Transmit, TransmitError};
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
-use protocol::time::Instant;
+use protocol::time::{Instant, Period};
 
 pub(crate) use host::End;
 use host::File;
@@ -82,7 +82,14 @@ fn start(
     // Signals to the host that the node is ready.
     output.write(reply.finish(&Measured::default()))?;
     match setup.channel {
-        Channel::Fifo => serve(&input, &output, node, &mut pins, &mut journal, reply),
+        Channel::Fifo => serve(
+            [&input, &output],
+            node,
+            &mut pins,
+            &mut journal,
+            reply,
+            setup.config.period,
+        ),
         Channel::Uart => {
             adapter::serve(node, &mut pins, &mut journal, setup.config.period);
             reply.clear();
@@ -108,12 +115,12 @@ fn build<'a>(config: &Config, reset: ResetReason, slot: &'a mut MaybeUninit<Node
 /// Answers requests until the host closes the channel.
 #[inline(never)]
 fn serve(
-    input: &File,
-    output: &File,
+    [input, output]: [&File; 2],
     node: &mut Node,
     pins: &mut Pins,
     journal: &mut Journal,
     reply: &mut Reply,
+    period: Period,
 ) -> Result<(), End> {
     let mut record = [0; REQUEST_LEN];
     while input.read(&mut record).is_ok() {
@@ -126,6 +133,12 @@ fn serve(
             }
             Request::BusOff => {
                 node.bus_off();
+                continue;
+            }
+            Request::Took(time) => {
+                if time > period.duration() {
+                    node.count_overrun();
+                }
                 continue;
             }
             Request::Stack => (stack::used() as u32).into(),

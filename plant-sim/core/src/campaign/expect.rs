@@ -18,6 +18,7 @@
 //! | nobody acknowledges commands for 9 samples or more | 9 samples | one more command gets through once the controller is passive; it is repeated, and keeps all later ones waiting |
 //! | a node babbles for 9 samples or more | 8 samples | nothing gets through |
 //! | drives or controller without power for 9 samples or more | 8 samples | as if they were silent: they start with torque off |
+//! | a controller that needs longer than its period for 14 samples or more | 13 samples | it says so in the sixth answer, each of which waits for the one before, unless the drives have let go by then |
 //! | a drive without power for 2 samples or more | 4 samples | the next feedback says so, and one sample to answer |
 //! | the clock of the drives stands still for 9 samples or more | 8 samples | no feedback, so no commands: the drives let go by a clock of their own |
 //! | a clock within 100 ppm, as every crystal is | the same as without it | nobody else counts on a time |
@@ -128,6 +129,9 @@ fn of(fault: &Spell, period: Period) -> Expected {
         }
         What::Silent(Node::Drives) => by_length(2, 9, 8),
         What::Silent(Node::Controller) | What::Dead(_) => no_survival(by_length(0, 9, 8)),
+        What::Slow(seconds) if Duration::from_seconds(seconds) >= period.duration() => {
+            no_survival(by_length(0, 14, 13))
+        }
         What::Babbling(_) => by_length(2, 9, 8),
         What::Wires(_) => no_survival(by_length(2, 9, 8)),
         What::Motor(_, MotorDefect::Runaway) if lasts >= RUNAWAY => {
@@ -210,6 +214,7 @@ pub(super) fn lateness(faults: &[Spell], period: Period) -> Duration {
         | What::Wires(_)
         | What::Foreign(..)
         | What::Dead(_)
+        | What::Slow(_)
         | What::Clock(_) => is_taken(period),
         What::Frames(info, kind) if info.content == Content::Command => match kind {
             FrameFault::Delay(s) | FrameFault::Jitter(s) => Duration::from_seconds(s),

@@ -7,6 +7,7 @@ use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::{Message, Nmt, Node};
 use protocol::schema::{Kind, MessageInfo, Signal};
+use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use super::impostor::like;
@@ -24,6 +25,8 @@ pub struct Faulty<P> {
     random: Rand64,
     /// Whether it had no power at the last call.
     was_dead: bool,
+    /// Until then it works on the samples that it has received, if it is slow.
+    busy: Instant,
     /// What the node has sent in the current call; empty between calls.
     sent: Outbox,
 }
@@ -49,6 +52,7 @@ impl<P: Peer> Faulty<P> {
             // Each node draws from its own sequence, so that the frames of one do not change the faults of another.
             random: Rand64::new(u128::from(seed) << 8 | node as u128),
             was_dead: false,
+            busy: Instant::ORIGIN,
             sent: Outbox::new(),
         };
         for fault in faults {
@@ -62,6 +66,7 @@ impl<P: Peer> Faulty<P> {
         let concerns = match fault.what {
             What::Frames(info, _) => info.sender.is_none_or(|sender| sender == self.node),
             What::Silent(node) | What::Dead(node) => node == self.node,
+            What::Slow(_) => self.node == Node::Controller,
             _ => false,
         };
         if concerns {
@@ -96,6 +101,20 @@ impl<P: Peer> Faulty<P> {
             return Ok(());
         };
         self.peer.poll(now, Some(&reset), world, &mut Outbox::new())
+    }
+
+    /// How late the node answers what it has received `now`: it works on one sample after the other.
+    fn lateness(&mut self, now: Instant, received: Option<&CanFrame>) -> Duration {
+        if received.is_some_and(|frame| table::FEEDBACK.identifies(frame)) {
+            for Suffered { fault, .. } in &self.faults {
+                if let What::Slow(seconds) = fault.what
+                    && fault.acts(now)
+                {
+                    self.busy = self.busy.max(now) + duration(seconds);
+                }
+            }
+        }
+        self.busy.since(now)
     }
 
     /// What becomes of a frame that the node sends at `time`.
@@ -248,9 +267,15 @@ impl<P: Peer> Peer for Faulty<P> {
         }
         let mut sent = std::mem::take(&mut self.sent);
         self.peer.poll(now, received, world, &mut sent)?;
+        let late = self.lateness(now, received);
+        if late > Duration::ZERO
+            && let Some((time, _)) = sent.first()
+        {
+            self.peer.took((*time + late).since(now))?;
+        }
         for (time, frame) in sent.drain(..) {
             if !silent {
-                self.suffer(time, frame, out);
+                self.suffer(time + late, frame, out);
             }
         }
         self.sent = sent;
@@ -259,6 +284,10 @@ impl<P: Peer> Peer for Faulty<P> {
 
     fn bus_off(&mut self, now: Instant) -> Result<Duration, PeerError> {
         self.peer.bus_off(now)
+    }
+
+    fn took(&mut self, time: Duration) -> Result<(), PeerError> {
+        self.peer.took(time)
     }
 
     fn finish(&mut self) -> Result<(), PeerError> {

@@ -129,7 +129,7 @@ const fn of_axis(
 
 /// Every kind, in the order of the documents.
 #[rustfmt::skip]
-pub const KINDS: [Kind; 42] = [
+pub const KINDS: [Kind; 43] = [
     of_message("loss", Some(SHARE), "the frame never gets to the bus"),
     Kind {
         second: Some(Value { default: Some(8.0), ..value(1.0, 1000.0, "frames in a burst, on average") }),
@@ -152,6 +152,7 @@ pub const KINDS: [Kind; 42] = [
     of_message("ack-error", Some(ATTEMPTS), "the node that sends reads no acknowledgement"),
     of_node("silent", None, "the node neither receives nor sends; when the fault ends it goes on where it is"),
     of_node("dead", None, "the node has no power; when the fault ends it starts anew"),
+    of_node("slow", Some(SECONDS), "the controller needs so much longer for a sample, and the next one waits for that"),
     of_node("babbling", None, "the node sends the frame of the highest priority, again and again"),
     of_node("misread", Some(SHARE), "the node, and no other, finds a wrong CRC in what it receives"),
     of_node("no-recovery", None, "once bus-off, the node stays so: nobody tells its CAN controller to recover"),

@@ -159,6 +159,13 @@ fn of_node(node: Node, kind: &str, value: f64) -> Result<What, String> {
             );
         }
         "dead" => What::Dead(node),
+        "slow" if node != Node::Controller => {
+            return Err(
+                "nobody but the controller has to answer within a sample; allowed: controller:slow, or the delay of a message"
+                    .into(),
+            );
+        }
+        "slow" => What::Slow(value),
         "babbling" => What::Babbling(node),
         "misread" => What::Misreads(node, value),
         "no-recovery" => What::NoRecovery(node),

@@ -100,6 +100,12 @@ impl Place<'_> {
                 (Place::LockStep(_) | Place::RealTime(_), What::Dead(Node::Controller)) => {
                     "an external controller has a power supply of its own; allowed: controller:silent, or --controller qemu"
                 }
+                (Place::LockStep(_) | Place::RealTime(_), What::Slow(_)) => {
+                    "an external controller has a processor of its own; allowed: command:delay, or --controller qemu"
+                }
+                (Place::Qemu(options), What::Slow(_)) if options.channel == Channel::Uart => {
+                    "over a serial line the board does not learn how long it took; allowed: with --channel fifo"
+                }
                 (Place::RealTime(_), What::Clock(_)) => {
                     "in real time samples are taken by the clock of this machine; allowed without --real-time"
                 }

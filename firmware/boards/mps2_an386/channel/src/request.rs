@@ -1,7 +1,7 @@
 //! Requests of the host to the board.
 
 use protocol::frame::CanFrame;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 
 use crate::frames::{FRAME_LEN, frame_from_bytes, frame_to_bytes};
 use crate::put;
@@ -21,6 +21,8 @@ pub enum Request {
     },
     /// The CAN controller has gone bus-off. There is no answer.
     BusOff,
+    /// The answer to the last poll has taken so long, by the time of the host, which is all that there is. There is no answer.
+    Took(Duration),
     /// Report the most stack used so far: an answer without frames, in bytes instead of ticks.
     Stack,
     /// Fail. The only answer is the greeting of the next start.
@@ -68,6 +70,7 @@ const POLL_WITH_FRAME: u8 = 1;
 const STACK: u8 = 2;
 const PLANT: u8 = 3;
 const BUS_OFF: u8 = 4;
+const TOOK: u8 = 5;
 
 impl Request {
     /// The record.
@@ -88,6 +91,10 @@ impl Request {
                 put(&mut bytes, 9, &frame_to_bytes(frame));
             }
             Self::BusOff => put(&mut bytes, 0, &[BUS_OFF]),
+            Self::Took(time) => {
+                put(&mut bytes, 0, &[TOOK]);
+                put(&mut bytes, 1, &time.nanos().to_le_bytes());
+            }
             Self::Stack => put(&mut bytes, 0, &[STACK]),
             Self::Plant(fault) => put(&mut bytes, 0, &[PLANT, *fault as u8]),
         }
@@ -99,7 +106,8 @@ impl Request {
     pub fn from_bytes(bytes: &[u8; REQUEST_LEN]) -> Option<Self> {
         let (&kind, rest) = bytes.split_first()?;
         let (now, record) = rest.split_first_chunk()?;
-        let now = Instant::from_nanos(u64::from_le_bytes(*now));
+        let nanos = u64::from_le_bytes(*now);
+        let now = Instant::from_nanos(nanos);
         match kind {
             POLL => Some(Self::Poll { now, frame: None }),
             POLL_WITH_FRAME => {
@@ -108,6 +116,7 @@ impl Request {
             }
             STACK => Some(Self::Stack),
             BUS_OFF => Some(Self::BusOff),
+            TOOK => Some(Self::Took(Duration::from_nanos(nanos))),
             PLANT => {
                 let (&fault, _) = rest.split_first()?;
                 let fault = Fault::ALL.get(usize::from(fault))?;

@@ -53,7 +53,8 @@ proptest! {
         let now = Instant::from_nanos(now);
         let request = Request::Poll { now, frame };
         prop_assert_eq!(Request::from_bytes(&request.to_bytes()), Some(request));
-        for request in [Request::BusOff, Request::Stack] {
+        let took = Request::Took(now.since(Instant::ORIGIN));
+        for request in [Request::BusOff, Request::Stack, took] {
             prop_assert_eq!(Request::from_bytes(&request.to_bytes()), Some(request));
         }
     }
