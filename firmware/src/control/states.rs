@@ -97,9 +97,9 @@ pub const TRANSITIONS: [(State, Event, State); 52] = {
         (PreOperational, PeerReady, Ready),
         (PreOperational, EmergencyStop, EStop(Off)),
         (Ready, Enable, Enabling(0)),
-        (Ready, FaultOff, PreOperational),
-        // Without torque the brake alone holds the lift.
+        // What breaks without torque is as broken as with it. Nothing is to stop.
         (Ready, FaultBrake, Fault(Off)),
+        (Ready, FaultOff, Fault(Off)),
         (Ready, EmergencyStop, EStop(Off)),
         // The arm is at rest and the brake not open yet: there is nothing to stop.
         (Enabling(0), BrakeOpen, Enabled),

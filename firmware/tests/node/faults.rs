@@ -113,7 +113,7 @@ fn three_bad_feedback_frames_in_a_row_stop_the_arm() {
 }
 
 /// A frame with a valid checksum and a shoulder speed of NaN.
-fn not_a_number(good: &CanFrame) -> CanFrame {
+pub(crate) fn not_a_number(good: &CanFrame) -> CanFrame {
     let mut bytes = good.data().to_vec();
     let counter = bytes[bytes.len() - 3];
     bytes[21..25].copy_from_slice(&f32::NAN.to_le_bytes());
@@ -224,8 +224,10 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
         }
         Cause::SoftLimit => {
             bench.request(MotionRequest::Disable);
-            bench.put(&Vector4::new(0.2, 2.56, 0.15, 0.3));
-            bench.run(2);
+            for step in 1..=100 {
+                bench.put(&Vector4::new(0.2, 1.5 + 0.0106 * step as f32, 0.15, 0.3));
+                bench.step();
+            }
             let frame = bench.motion(MotionRequest::Enable);
             bench.wire.to_node.push_back(frame);
             bench.run(20)

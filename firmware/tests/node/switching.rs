@@ -2,11 +2,12 @@
 
 use nalgebra::Vector4;
 use protocol::messages::{
-    Cause, ControlWord, Message, Mode, MotionRequest, Outcome, RefusalReason,
+    Cause, ControlWord, DriveStatus, Message, Mode, MotionRequest, Outcome, RefusalReason,
 };
 use protocol::table;
 
 use crate::bench::{Bench, SILENCE, estop, is_off};
+use crate::faults::{not_a_number, states};
 
 #[test]
 fn switching_on_takes_a_known_peer_and_opens_the_brake_under_torque() {
@@ -206,4 +207,50 @@ fn a_peer_that_goes_silent_during_an_emergency_stop_leaves_no_torque() {
     assert_eq!(bench.mode(), Mode::EStop);
     let word = bench.node.controller().control_word();
     assert_eq!(word, ControlWord::ESTOP);
+}
+
+/// Nothing is to be stopped in ready, but what is broken stays so: the arm is not ready again by itself, though the cause has gone.
+#[test]
+fn a_fault_of_an_arm_that_is_ready_stays_until_it_is_reset() {
+    type Harm = fn(&mut Bench);
+    let harms: [(Cause, Harm); 5] = [
+        (Cause::EncoderFault, |bench| bench.shove(0.03)),
+        (Cause::EncoderFault, |bench| {
+            bench.status = DriveStatus::READY;
+        }),
+        (Cause::DriveFault, |bench| {
+            bench.status = bench.status | DriveStatus::FAULT;
+        }),
+        (Cause::BadValue, |bench| {
+            let frame = not_a_number(&bench.next_feedback());
+            bench.wire.to_node.extend([frame; 3]);
+        }),
+        (Cause::PeerSilent, |bench| {
+            bench.now += SILENCE;
+            bench.poll();
+        }),
+    ];
+    for (cause, harm) in harms {
+        let (mut bench, enable) = Bench::asked_to_enable();
+        bench.wire.to_node.clear();
+        bench.run(10);
+        assert_eq!(bench.mode(), Mode::Ready);
+        let sound = bench.status;
+        harm(&mut bench);
+        bench.step();
+        bench.status = sound;
+        let sent = bench.run(50);
+        assert!(states(&sent).iter().all(|it| it.cause == cause), "{cause}");
+        assert_eq!(bench.mode(), Mode::Fault, "{cause}");
+        bench.wire.to_node.push_back(enable);
+        assert!(is_off(&bench.command()), "{cause}");
+        let reset = bench.request(MotionRequest::FaultReset);
+        assert_eq!(reset, Some(Outcome::Accepted), "{cause}");
+        // Drives that were silent have to be known anew.
+        let expected = match cause {
+            Cause::PeerSilent => Mode::PreOperational,
+            _ => Mode::Ready,
+        };
+        assert_eq!(bench.mode(), expected, "{cause}");
+    }
 }
