@@ -12,7 +12,7 @@ use sim::campaign::tally::{Outcome, Tally};
 
 use super::CampaignError;
 use super::plan::{self, Hash};
-use super::results::Reader;
+use super::results::{self, Reader};
 use super::shard::{Shard, ShardHeader};
 use crate::say;
 
@@ -117,6 +117,7 @@ fn put_together(
     }
 }
 
+const AGAIN: &str = "merge them again";
 const RUN_IT: &str = "plant-sim campaign missing lists the shards to run";
 const NOT_AS_PLANNED: &str = "a case here, or in a file merged with it, is not as the plan has it; plant-sim campaign run PLAN \
                               --shard K/N --resume finds it and runs it again, if it is given each part";
@@ -226,16 +227,15 @@ pub fn tally(path: &Path, results: impl Read) -> Result<Tally, CampaignError> {
         )
     })?;
     let mut tally = Tally::default();
-    for line in lines {
+    for (number, line) in (2..).zip(lines) {
         let line = line.map_err(CampaignError::read(path))?;
-        let outcome: Outcome = serde_json::from_str(&line).map_err(|error| {
-            CampaignError::wrong(path, format!("{error}: this is no result of a case"))
-        })?;
+        let outcome = results::outcome(line.as_bytes())
+            .map_err(|what| CampaignError::wrong(path, format!("line {number} {what}; {AGAIN}")))?;
         tally.add(&outcome);
     }
     if tally.cases() != merged.cases {
         let what = format!(
-            "{} of {} cases are here; merge them again",
+            "{} of {} cases are here; {AGAIN}",
             tally.cases(),
             merged.cases
         );

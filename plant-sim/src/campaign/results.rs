@@ -1,13 +1,66 @@
 //! A file of results, read a line at a time: the one place that says which of its lines are good.
+//!
+//! A line ends with a hash of the rest of it, so that a number which a disk or an editor has changed is not taken for a result.
 
 use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use sim::campaign::case::Case;
 use sim::campaign::tally::Outcome;
+use sim::campaign::verdict::Verdict;
 
-use super::CampaignError;
 use super::shard::{Shard, ShardHeader};
+use super::{CampaignError, plan};
+
+/// A line of results: a case and what became of it.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ResultLine {
+    /// Which.
+    pub case: Case,
+    /// What became of it.
+    pub verdict: Verdict,
+    /// The first 16 digits of the SHA-256 of the line up to the comma before this key.
+    pub hash: String,
+}
+
+/// Length of what [`end`] gives.
+const END: usize = r#","hash":"0123456789abcdef"}"#.len();
+
+/// The line of an outcome, without its end.
+pub fn line(outcome: &Outcome) -> String {
+    let mut line = plan::line(outcome);
+    line.truncate(line.len() - 1);
+    let end = end(line.as_bytes());
+    line + &end
+}
+
+/// How a line that begins like this ends.
+fn end(line: &[u8]) -> String {
+    let hash = Sha256::digest(line);
+    let hash = hash.iter().take(8).map(|byte| format!("{byte:02x}"));
+    format!(r#","hash":"{}"}}"#, hash.collect::<String>())
+}
+
+/// The outcome in a line.
+///
+/// # Errors
+/// What the line is instead.
+pub fn outcome(line: &[u8]) -> Result<Outcome, String> {
+    let outcome: Outcome =
+        serde_json::from_slice(line).map_err(|_| "is no result of a case".to_string())?;
+    let parts = line.len().checked_sub(END).map(|at| line.split_at(at));
+    match parts {
+        Some((line, found)) if end(line).as_bytes() == found => Ok(outcome),
+        _ => Err(format!(
+            "is case {}, and not as it was written: its hash is another",
+            outcome.case.case
+        )),
+    }
+}
 
 /// A file of results, of which the results of its part are read: in their order, none left out, and nothing else.
 #[derive(Debug)]
@@ -42,7 +95,7 @@ impl Reader {
             number: 0,
         };
         lines.read(path)?;
-        let header: Option<ShardHeader> = lines.parsed();
+        let header: Option<ShardHeader> = serde_json::from_slice(lines.whole()).ok();
         let header = header
             .filter(|header| header.shard == shard)
             .ok_or_else(|| {
@@ -70,25 +123,24 @@ impl Reader {
             return Ok(None);
         }
         let number = self.lines.number;
-        let outcome: Option<Outcome> = self.lines.parsed();
-        let what = match outcome {
-            Some(outcome) if outcome.case.case == due && !is_over => {
+        let what = match self.lines.outcome() {
+            Ok(outcome) if outcome.case.case == due && !is_over => {
                 self.due += shard.of;
                 self.length += self.lines.line.len() as u64;
                 return Ok(Some(outcome));
             }
-            Some(outcome) if is_over => {
+            Ok(outcome) if is_over => {
                 format!(
                     "line {number} is case {}, after the last",
                     outcome.case.case
                 )
             }
-            Some(outcome) => format!(
+            Ok(outcome) => format!(
                 "line {number} is case {}, where case {due} belongs",
                 outcome.case.case
             ),
-            None if self.lines.line.is_empty() => format!("it ends before case {due}"),
-            None => format!("line {number} is no result of a case"),
+            Err(_) if self.lines.line.is_empty() => format!("it ends before case {due}"),
+            Err(what) => format!("line {number} {what}"),
         };
         Err(CampaignError::damaged(&self.path, shard, what))
     }
@@ -131,10 +183,12 @@ impl Lines {
         read.map_err(CampaignError::read(path)).map(drop)
     }
 
-    /// What the line says; `None` for one that says something else or was cut short.
-    fn parsed<T: serde::de::DeserializeOwned>(&self) -> Option<T> {
-        self.line
-            .strip_suffix(b"\n")
-            .and_then(|line| serde_json::from_slice(line).ok())
+    /// The line without its end; empty if it has none, as one that was cut short.
+    fn whole(&self) -> &[u8] {
+        self.line.strip_suffix(b"\n").unwrap_or_default()
+    }
+
+    fn outcome(&self) -> Result<Outcome, String> {
+        outcome(self.whole())
     }
 }

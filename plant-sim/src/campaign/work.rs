@@ -10,7 +10,8 @@ use sim::campaign::verdict::Verdict;
 use sim::run::Failure;
 
 use super::CampaignError;
-use super::plan::{self, Plan};
+use super::plan::Plan;
+use super::results;
 use super::shard::{Results, Shard, ShardHeader};
 use crate::parallel;
 use crate::progress::Progress;
@@ -65,7 +66,7 @@ pub fn work(
             let outcome = Outcome { case, verdict };
             done.run += 1;
             done.missed += u64::from(!outcome.verdict.missed.is_empty());
-            lines += &plan::line(&outcome);
+            lines += &results::line(&outcome);
             lines.push('\n');
         }
         results.append(&lines)?;

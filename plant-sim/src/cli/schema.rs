@@ -4,11 +4,11 @@ use clap::{Args, ValueEnum};
 use firmware::mechanics::arm::ArmModel;
 use plant_sim::bench;
 use plant_sim::campaign::cases::Cases;
+use plant_sim::campaign::results::ResultLine;
 use plant_sim::parameters::Row;
 use plant_sim::reference::{markdown, of_input, of_output};
 use plant_sim::run::Results;
 use schemars::{Schema, schema_for_value};
-use sim::campaign::tally::Outcome;
 use sim::model::RobotModel;
 use sim::model::file::{ModelFile, PayloadFile};
 use sim::rehearsal::Plan;
@@ -75,7 +75,7 @@ impl Name {
             Self::Cost => of_output::<Report>(),
             Self::MotionBench => of_output::<bench::Report>(),
             Self::CampaignCases => of_input::<Cases>(),
-            Self::CampaignResult => of_output::<Outcome>(),
+            Self::CampaignResult => of_output::<ResultLine>(),
             // The controller's own type knows nothing of schemas: one of its values shows what it is.
             Self::ControllerModel => {
                 schema_for_value!(ArmModel::from(&RobotModel::irb_930_22_105()))

@@ -3,15 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::case::{Case, kinds};
 use super::verdict::{Requirement, Verdict};
 use crate::maths::{exp, ln};
 
-/// A line of results: a case and what became of it.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+/// A case and what became of it.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Outcome {
     /// Which.
     pub case: Case,

@@ -9,6 +9,8 @@
     reason = "a test fails by panicking"
 )]
 
+mod altered;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -38,8 +40,12 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
+        Self::with(CASES)
+    }
+
+    fn with(cases: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("cases.toml"), CASES).unwrap();
+        fs::write(folder.path().join("cases.toml"), cases).unwrap();
         let bench = Self { folder };
         bench.keep("plan.jsonl", &["plan", "--cases", "cases.toml"], 0);
         bench
@@ -236,55 +242,6 @@ fn damaged_results_are_missing_and_run_again() {
     assert_eq!(bench.call(&["merge", "out"], 0).stdout, merged);
     fs::copy(bench.path(file), bench.path("out/results-copy.jsonl")).unwrap();
     bench.refused(&["merge", "out"], "results are called results-K-of-N.jsonl");
-}
-
-/// Lines that are whole, and say what is not so.
-#[test]
-fn altered_results_are_not_merged() {
-    let bench = Bench::new();
-    bench.run("0/2", "out", &[]);
-    bench.run("1/2", "out", &[]);
-    let merged = bench.call(&["merge", "out"], 0).stdout;
-    let file = "out/results-0-of-2.jsonl";
-    let whole = bench.read(file);
-    for (from, to, why) in [
-        ("\"seed\":2}", "\"seed\":1946}", "is not as the plan has it"),
-        (
-            "duplicate@525ms",
-            "duplicate@526ms",
-            "is not as the plan has it",
-        ),
-        (
-            "\"missed\":[]",
-            "\"missed\":[\"no-alarm\"]",
-            "line 2 is no result of a case",
-        ),
-        (
-            "\"part\":0,\"of\":2",
-            "\"part\":7,\"of\":2",
-            "line 1 is not that of results of part 0/2",
-        ),
-        (
-            "\"part\":0,\"of\":2",
-            "\"part\":0,\"of\":0",
-            "line 1 is not that of results of part 0/2",
-        ),
-    ] {
-        let altered = whole.replacen(from, to, 1);
-        assert!(altered != whole, "{from}");
-        fs::write(bench.path(file), altered).unwrap();
-        bench.refused(&["merge", "out"], why);
-        bench.run("0/2", "out", &["--resume"]);
-        assert_eq!(bench.call(&["merge", "out"], 0).stdout, merged, "{why}");
-    }
-    // A plan of another length is another plan, even where this part has as many cases of it.
-    for (part, cases) in [(0, "\"cases\":23"), (1, "\"cases\":25")] {
-        let file = bench.path(&format!("out/results-{part}-of-2.jsonl"));
-        let whole = fs::read_to_string(&file).unwrap();
-        fs::write(&file, whole.replacen("\"cases\":24", cases, 1)).unwrap();
-        bench.refused(&["merge", "out"], "results of another plan than");
-        fs::write(&file, whole).unwrap();
-    }
 }
 
 #[test]
