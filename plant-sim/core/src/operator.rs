@@ -20,7 +20,7 @@ use protocol::time::{Duration, Instant, Period};
 use crate::heart::Heart;
 use crate::peer::{Outbox, Peer, PeerError};
 use crate::scenario::Scenario;
-use crate::world::{CellEvent, OperatorError, Spot, World};
+use crate::world::{CellEvent, OperatorError, Spot, Unused, World};
 use program::{Action, Program, Task};
 use signs::Button;
 
@@ -74,6 +74,11 @@ pub struct Operator {
     alarmed: bool,
     /// Time of the last new state.
     heard: Instant,
+    /// States since then that could not be used, and replies since the last request.
+    refused_states: Unused,
+    refused_replies: Unused,
+    /// Whether another node has sent requests in its name.
+    is_imitated: bool,
     /// Sequence number of the last accepted move.
     last_move: Option<u8>,
     /// Speed of the slowest move since the arm last arrived, the override included.
@@ -106,6 +111,9 @@ impl Operator {
             states: Receiver::new(Profile::Fd),
             alarmed: false,
             heard: Instant::ORIGIN,
+            refused_states: Unused::default(),
+            refused_replies: Unused::default(),
+            is_imitated: false,
             last_move: None,
             slowest: 1.0,
             pace: 1.0,
@@ -123,7 +131,7 @@ impl Operator {
             Ok(false) => {}
             Err(_) if self.given_up => self.stop_working([]),
             Err(error) => {
-                world.outcome = Some(Err(error));
+                world.outcome = Some(Err(self.explain(error)));
                 self.given_up = true;
                 self.stop_working([
                     Action::Request(MotionRequest::Stop),
@@ -131,6 +139,21 @@ impl Operator {
                 ]);
             }
         }
+    }
+
+    /// The same with what may be behind it.
+    fn explain(&self, error: OperatorError) -> OperatorError {
+        let is_about_requests = matches!(
+            error,
+            OperatorError::Refused { .. }
+                | OperatorError::Unfinished { .. }
+                | OperatorError::Late { .. }
+        );
+        if is_about_requests && self.is_imitated {
+            let why = Box::new(error);
+            return OperatorError::Imitated { why };
+        }
+        error
     }
 
     fn stop_working<const N: usize>(&mut self, last: [Action; N]) {
@@ -189,6 +212,7 @@ impl Operator {
             }
             Action::Request(request) => {
                 self.reply = None;
+                self.refused_replies = Unused::default();
                 let frame = self.send(*request);
                 self.awaited = self.sequence;
                 if let MotionRequest::SetOverride { pace } = request {
@@ -296,6 +320,10 @@ impl Operator {
             _ => OperatorError::Late {
                 what: action.awaited(self.awaited),
                 limit,
+                refused: match action {
+                    Action::Request(_) => self.refused_replies,
+                    _ => Unused::default(),
+                },
             },
         })
     }

@@ -29,7 +29,7 @@ pub use plan::{Move, Plan, Refused};
 use crate::operator::program::{Action, Program, Task};
 use crate::scenario::Ending;
 use crate::setup::{RunConfig, SetupError};
-use crate::world::{CellEvent, OperatorError, Spot};
+use crate::world::{CellEvent, OperatorError, Spot, Unused};
 
 /// Distance within which a cycle ends where it began, rad and m: roundings of f32, and far below what matters.
 const SAME: f32 = 1e-5;
@@ -288,6 +288,7 @@ impl Stage {
                 return Err(OperatorError::Late {
                     what: what.into(),
                     limit: PATIENCE,
+                    refused: Unused::default(),
                 });
             }
             self.sample()?;

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use firmware::node::Node;
+use protocol::codec::DecodeError;
 use protocol::messages::{Fault, Mode, MotionRequest, Refusal};
 use protocol::time::{Duration, Instant};
 
@@ -115,6 +116,25 @@ impl fmt::Display for Spot {
     }
 }
 
+/// Frames of a kind that have come, and could not be used.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Unused {
+    /// How many.
+    pub frames: u32,
+    /// Why the last one was refused; `None` for one that was repeated or old.
+    pub why: Option<DecodeError>,
+}
+
+impl fmt::Display for Unused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.frames, self.why) {
+            (0, _) => Ok(()),
+            (frames, Some(why)) => write!(f, "; {frames} came and had to be refused: {why}"),
+            (frames, None) => write!(f, "; {frames} came and had to be refused: repeated or old"),
+        }
+    }
+}
+
 fn of(spot: Option<Spot>) -> String {
     spot.map_or_else(String::new, |spot| format!("{spot}: "))
 }
@@ -157,18 +177,34 @@ pub enum OperatorError {
         limit: Duration,
     },
     /// Something expected did not arrive in time.
-    #[error("the controller is late: no {what} within {:.1} s", limit.seconds())]
+    #[error("the controller is late: no {what} within {:.1} s{refused}", limit.seconds())]
     Late {
         /// What was expected.
         what: String,
         /// Longest wait.
         limit: Duration,
+        /// What came instead.
+        refused: Unused,
     },
     /// The controller tells nothing new any more.
     #[error("the controller has been silent since {:.3} s, when its last new state came", since.seconds())]
     Silent {
         /// Time of its last new state.
         since: Instant,
+    },
+    /// What the controller tells cannot be used any more.
+    #[error("the controller has told nothing new since {:.3} s{refused}", since.seconds())]
+    Unusable {
+        /// Time of its last new state.
+        since: Instant,
+        /// What came instead.
+        refused: Unused,
+    },
+    /// Not what the operator asked for was done: somebody else asks in its name.
+    #[error("{why}; another node sends the requests of the operator as well, and the controller cannot tell them apart")]
+    Imitated {
+        /// What did not go on.
+        why: Box<Self>,
     },
     /// The controller has started anew, and knows nothing of the move that it was asked for.
     #[error("the controller has started anew: it went to {mode} without a stop")]

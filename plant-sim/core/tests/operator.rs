@@ -25,8 +25,10 @@ fn run(faults: &[&str]) -> (Summary, Record) {
 fn assert_silent(faults: &[&str], at: f64) {
     let (summary, _) = run(faults);
     let error = summary.error.unwrap();
-    let since = error
-        .strip_prefix("the controller has been silent since ")
+    // Of frames that came and could not be used, both are said.
+    let since = ["has been silent since ", "has told nothing new since "]
+        .iter()
+        .find_map(|how| error.strip_prefix("the controller ")?.strip_prefix(how))
         .and_then(|rest| rest.split_once(' '))
         .unwrap_or_else(|| panic!("{faults:?}: {error}"))
         .0
@@ -55,6 +57,38 @@ fn only_a_new_state_is_a_sign_of_life() {
     assert_silent(&["State:ack-error@0.35s"], 0.35);
     assert_silent(&["command:ack-error@0.4s"], 0.4);
     assert_silent(&["State:corrupt@0.35s"], 0.35);
+}
+
+/// What is said is what is wrong: frames that came are no silence, and requests of somebody else no delay.
+#[test]
+fn frames_that_came_in_vain_are_told() {
+    for (fault, expected) in [
+        (
+            "state:bad-value@0.4s",
+            "the controller has told nothing new since 0.380 s; 50 came and had to be refused: tracking_error 0 is not finite",
+        ),
+        (
+            "state:corrupt@0.4s",
+            "the controller has told nothing new since 0.380 s; 50 came and had to be refused: end-to-end CRC is wrong",
+        ),
+        (
+            "motionreply:corrupt@0s",
+            "no reply to request 1 (stop) within 2.0 s; 1 came and had to be refused: end-to-end CRC is wrong",
+        ),
+        (
+            "motion:forged@0.3s",
+            "jump refused: No more motions can be queued; another node sends the requests of the operator as well",
+        ),
+        (
+            "motion:forged@0.5s",
+            "the move did not end within 120 s at 1 of full speed; another node sends the requests of the operator as well",
+        ),
+    ] {
+        let error = run(&[fault]).0.error.unwrap();
+        assert!(error.contains(expected), "{fault}: {error}");
+    }
+    // Nobody takes for a request what has another CRC.
+    assert_eq!(run(&["motion:masquerade@0.3s"]).0.error, None);
 }
 
 /// 64 states ago, 1.28 s, the controller was about to start: neither is that believed, nor does it keep the operator waiting.

@@ -1,6 +1,6 @@
 //! What the operator hears of the controller, and what it makes of it: which frames are news, and when the run is over.
 
-use protocol::codec;
+use protocol::codec::{self, DecodeError};
 use protocol::frame::CanFrame;
 use protocol::messages::{Cause, Heartbeat, Message, Mode, Node, ParameterReply, Server, State};
 use protocol::schema::Content;
@@ -8,7 +8,7 @@ use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use super::Operator;
-use crate::world::OperatorError;
+use crate::world::{OperatorError, Unused};
 
 /// Time without a new state after which the controller counts as silent: fifty states.
 pub(super) const SILENCE_LIMIT: Duration = Duration::from_secs(1);
@@ -22,19 +22,26 @@ impl Operator {
         let Some(info) = table::of_frame(frame) else {
             return;
         };
+        let decoded = codec::decode(frame);
+        // No node receives its own frames.
+        self.is_imitated |= info.content == Content::Motion && decoded.is_ok();
         // Commands do not concern an operator.
         if info.sender != Some(Node::Controller) || info.content == Content::Command {
             return;
         }
-        let Ok(received) = codec::decode(frame) else {
-            return;
+        let received = match decoded {
+            Ok(received) => received,
+            Err(error) => return self.refuse(info.content, Some(error)),
         };
         match received.message {
             Message::State(state) => {
                 let verdict = self.states.check(received.counter.unwrap_or(0));
                 if verdict.is_new() {
                     self.heard = now;
+                    self.refused_states = Unused::default();
                     self.state = Some(state);
+                } else {
+                    self.refuse(info.content, None);
                 }
             }
             // A controller that starts anew begins its counters anew, and says at once that it is not operational. Its first state has
@@ -55,6 +62,16 @@ impl Operator {
         }
     }
 
+    fn refuse(&mut self, content: Content, why: Option<DecodeError>) {
+        let refused = match content {
+            Content::State => &mut self.refused_states,
+            Content::MotionReply => &mut self.refused_replies,
+            _ => return,
+        };
+        let frames = refused.frames.saturating_add(1);
+        *refused = Unused { frames, why };
+    }
+
     /// Ends the run if the controller has stopped by itself or gone silent.
     pub(super) fn watch(&self, now: Instant) -> Result<(), OperatorError> {
         if let Some(state) = self.state
@@ -73,7 +90,11 @@ impl Operator {
             return Err(OperatorError::Restarted { mode: state.mode });
         }
         if now.since(self.heard) > SILENCE_LIMIT {
-            return Err(OperatorError::Silent { since: self.heard });
+            let (since, refused) = (self.heard, self.refused_states);
+            return Err(match refused.frames {
+                0 => OperatorError::Silent { since },
+                _ => OperatorError::Unusable { since, refused },
+            });
         }
         Ok(())
     }
