@@ -259,11 +259,12 @@ impl Monitor {
         }
         // Readings of whatever axis that do not go where it went until now are not those of an obstacle, which only slows it down in so few
         // samples, nor of a load that was lost or added, which does not throw it back as fast as it went.
+        let axis = most_beyond(disturbance, &self.collision).unwrap_or(axis);
         let (before, now) = (self.wanted, wanted);
         let slow = self.speed * SLOW;
         let was_to_move = |axis: &Axis| axis.of(&before).abs() > axis.of(&slow);
         let mut moving = Axis::ALL.into_iter().filter(was_to_move);
-        let mut stands = moving.clone().chain([axis]);
+        let stands = moving.clone().chain([axis]);
         let is_still = |axis: &Axis| readings.stays_still(*axis, axis.of(&self.velocity_felt));
         let turned = |axis: &Axis| {
             let (before, now, found) = (axis.of(&before), axis.of(now), axis.of(qd));
@@ -271,15 +272,30 @@ impl Monitor {
         };
         // Away from its reference, and not ahead of it on the same way.
         let is_away = (axis.of(qd) - axis.of(now)).abs() > 0.5 * axis.of(qd).abs();
-        Felt::Fault(if let Some(axis) = stands.find(is_still) {
-            of_axis(Cause::StuckSensor, axis, error, &Vector4::zeros())
-        } else if let Some(axis) = moving.find(turned) {
-            of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
-        } else if is_away && readings.runs_away(axis, axis.of(&self.velocity_felt)) {
-            of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
-        } else {
-            let axis = most_beyond(disturbance, &self.collision).unwrap_or(axis);
-            of_axis(Cause::Collision, axis, disturbance, &self.collision)
+        Felt::Fault(
+            if let Some(axis) = self.farthest(stands.filter(is_still), error) {
+                of_axis(Cause::StuckSensor, axis, error, &Vector4::zeros())
+            } else if let Some(first) = moving.find(turned)
+                && let Some(axis) = self.farthest(moving.filter(turned).chain([first, axis]), error)
+            {
+                of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
+            } else if is_away && readings.runs_away(axis, axis.of(&self.velocity_felt)) {
+                of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
+            } else {
+                of_axis(Cause::Collision, axis, disturbance, &self.collision)
+            },
+        )
+    }
+
+    /// Of these axes the one that is farthest off its reference, as a share of what it may be: a faulty axis shakes the others.
+    fn farthest(&self, axes: impl Iterator<Item = Axis>, error: &Vector4<f32>) -> Option<Axis> {
+        let share = error.component_div(&self.following_error).abs();
+        axes.reduce(|one, other| {
+            if other.of(&share) > one.of(&share) {
+                other
+            } else {
+                one
+            }
         })
     }
 

@@ -201,7 +201,9 @@ pub enum OperatorError {
         refused: Unused,
     },
     /// Not what the operator asked for was done: somebody else asks in its name.
-    #[error("{why}; another node sends the requests of the operator as well, and the controller cannot tell them apart")]
+    #[error(
+        "{why}; another node sends the requests of the operator as well, and the controller cannot tell them apart"
+    )]
     Imitated {
         /// What did not go on.
         why: Box<Self>,

@@ -117,6 +117,41 @@ fn a_lying_encoder_gets_no_controlled_stop() {
     assert!(unseen <= 40, "{unseen} of 320 unseen");
 }
 
+/// A jump of the elbow shakes the other axes, some of which it throws back, and in ready it is told with its axis as well.
+#[test]
+fn a_jump_is_told_of_its_own_axis() {
+    for (name, axis, jump, at) in [
+        ("square", "elbow", -0.02184, 879.64),
+        ("square", "elbow", -0.02486, 604.76),
+        ("square", "elbow", -0.02392, 875.24),
+        ("gate", "lift", 0.00213, 603.91),
+        ("gate", "wrist", 0.86573, 938.29),
+    ] {
+        let mut scenario = Scenario::built_in(name).expect("it is built in");
+        scenario.cycles = 1;
+        let text = format!("encoder:{axis}:jump={jump}@{at}ms");
+        let (summary, _) = run_of(scenario, &[&text], 0);
+        assert_eq!(
+            summary.faults[0].axis,
+            Some(axis),
+            "{text}: {:?}",
+            summary.faults
+        );
+    }
+}
+
+/// Nobody acknowledges a feedback, so that it is repeated without end: what is old is no sign of life, and keeps no clock from going on.
+#[test]
+fn feedback_that_is_repeated_without_end_is_that_of_silent_drives() {
+    let mut scenario = Scenario::built_in("square").expect("it is built in");
+    scenario.cycles = 1;
+    // The last new one comes as torque has just gone off; 100 ms later they are silent.
+    let (summary, _) = run_of(scenario, &["feedback:ack-error@1211.8ms"], 0);
+    let fault = &summary.faults[0];
+    assert_eq!(fault.cause, Cause::PeerSilent.name());
+    assert!((1.312..1.32).contains(&fault.time_s), "{fault:?}");
+}
+
 /// The controller hears nothing of its commands being lost; the drives brake by themselves.
 #[test]
 fn the_drives_brake_when_commands_stop_arriving() {
