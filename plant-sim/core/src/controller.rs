@@ -4,7 +4,6 @@ use firmware::cabinet::rejoin::Rejoin;
 use firmware::cabinet::sample_clock::SampleClock;
 use firmware::control::controller::Config;
 use firmware::node::Node;
-use protocol::codec;
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
 use protocol::table;
@@ -30,7 +29,7 @@ pub struct InProcess {
     node: Node,
     clock: SampleClock,
     rejoin: Rejoin,
-    /// Time of the last feedback, or of the last call without one.
+    /// Time of the last new feedback, or of the last call without one.
     last: Option<Instant>,
     /// Frames sent in the current call; empty between calls.
     sent: Vec<CanFrame>,
@@ -124,11 +123,9 @@ impl InProcess {
             }
             Some(frame) => {
                 let advances = self.clock.observe(frame);
-                // What cannot be read is no reason to let its time stand still.
-                if advances || table::FEEDBACK.identifies(frame) && codec::decode(frame).is_ok() {
-                    self.last = Some(now);
-                }
+                // What cannot be read or is old is no reason to let its time stand still.
                 if advances {
+                    self.last = Some(now);
                     self.node.poll(self.clock.now(), None, &mut send);
                 }
             }

@@ -55,7 +55,7 @@ fn modes(record: &Record) -> Vec<Mode> {
 }
 
 /// In motion at 0.4 s.
-const CASES: [(&str, Cause); 11] = [
+const CASES: [(&str, Cause); 12] = [
     ("feedback:loss@0.4s", Cause::PeerSilent),
     ("feedback:corrupt@0.4s", Cause::Corrupted),
     ("feedback:bad-value@0.4s", Cause::BadValue),
@@ -140,16 +140,15 @@ fn a_jump_is_told_of_its_own_axis() {
     }
 }
 
-/// Nobody acknowledges a feedback, so that it is repeated without end: what is old is no sign of life, and keeps no clock from going on.
+/// Nobody acknowledges a feedback, so that it is repeated without end: old ones keep no clock from going on, and the controller says that it has
+/// switched off.
 #[test]
-fn feedback_that_is_repeated_without_end_is_that_of_silent_drives() {
+fn feedback_that_is_repeated_without_end_keeps_nobody_from_switching_off() {
     let mut scenario = Scenario::built_in("square").expect("it is built in");
     scenario.cycles = 1;
-    // The last new one comes as torque has just gone off; 100 ms later they are silent.
+    // The last new one is that with which torque goes off.
     let (summary, _) = run_of(scenario, &["feedback:ack-error@1211.8ms"], 0);
-    let fault = &summary.faults[0];
-    assert_eq!(fault.cause, Cause::PeerSilent.name());
-    assert!((1.312..1.32).contains(&fault.time_s), "{fault:?}");
+    assert!(summary.completed, "{:?}", summary.error);
 }
 
 /// The controller hears nothing of its commands being lost; the drives brake by themselves.

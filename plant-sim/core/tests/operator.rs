@@ -65,7 +65,7 @@ fn frames_that_came_in_vain_are_told() {
     for (fault, expected) in [
         (
             "state:bad-value@0.4s",
-            "the controller has told nothing new since 0.380 s; 50 came and had to be refused: tracking_error 0 is not finite",
+            "the controller has told nothing new since 0.380 s; 50 came and had to be refused: tracking_error shoulder is not finite",
         ),
         (
             "state:corrupt@0.4s",

@@ -169,8 +169,9 @@ fn of_frames(content: Content, kind: FrameFault) -> Option<&'static [Cause]> {
     })
 }
 
-/// Whether such a fault may end a run without a word of the controller: nobody is there to command the arm, or to be told.
-pub(super) fn may_be_untold(spell: &Spell) -> bool {
+/// Whether such a fault may end a run without a word of the controller: nobody is there to command the arm, or to be told; or the arm `was_off`, and
+/// what the controller says of that waits behind a command that nobody acknowledges.
+pub(super) fn may_be_untold(spell: &Spell, was_off: bool) -> bool {
     let stays = spell.until == Instant::MAX;
     match spell.what {
         What::Silent(Node::Operator)
@@ -182,6 +183,7 @@ pub(super) fn may_be_untold(spell: &Spell) -> bool {
         | What::Dead(Node::Controller) => true,
         // A word gets through once the bus is free.
         What::Babbling(_) | What::Wires(_) => stays,
+        What::Attempts(info, ErrorKind::Ack, _) if info.content == Content::Command => stays && was_off,
         What::Frames(info, _) | What::Foreign(info, _) | What::Attempts(info, ..) => !matches!(
             info.content,
             Content::Feedback | Content::Command | Content::Heartbeat(_)

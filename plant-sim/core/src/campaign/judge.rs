@@ -12,7 +12,7 @@ use super::bounds::{Bounds, STANDING};
 use super::expect::Expected;
 use super::lift::Lift;
 use super::newest::Newest;
-use super::reports::{Reports, is_at_rest};
+use super::reports::{Reports, is_at_rest, is_faulty};
 use super::request::Request;
 use super::spells::Spells;
 use super::verdict::{Requirement, Verdict, round};
@@ -138,12 +138,10 @@ impl Judge {
             Ending::Stopped => told == Some(Cause::EStop),
         };
         // Drives that let go in time for that need not be told.
-        let is_off = matches!(self.cut, Some((_, Mode::Disabling)));
-        self.ended_switching_off = completed && is_off;
+        self.ended_switching_off = completed && matches!(self.cut, Some((_, Mode::Disabling)));
         self.rest = self.last;
         // Without feedback it may still be waiting for the brake.
-        let has_latched = matches!(self.mode, Mode::FaultReaction | Mode::Fault | Mode::EStop);
-        if self.reports.latched().is_some() && !has_latched {
+        if self.reports.latched().is_some() && !is_faulty(self.mode) {
             self.miss(Requirement::Latch);
         }
         let is_early = self
@@ -169,8 +167,9 @@ impl Judge {
         self.judge_fall();
         let is_latched = self.reports.latched().is_some();
         let is_well = self.survived || self.ended_switching_off;
+        let was_off = self.reports.is_at_rest() || (self.first().is_none() && !self.is_powered());
         self.missed
-            .extend(self.faults.judge_told(told, is_latched, is_well));
+            .extend(self.faults.judge_told(told, was_off, is_well));
         let end = self.last.map_or(0.0, |last| last.t);
         if is_latched && !self.faults.leave_the_brake_open() && self.newest.enables_torque(end) {
             self.miss(Requirement::Standstill);
@@ -303,7 +302,7 @@ impl Judge {
     }
 
     fn judge_fall(&mut self) {
-        let is_latched = self.reports.latched().is_some();
+        let is_latched = self.reports.latched().is_some() && !self.reports.is_at_rest();
         // An arm that went on moved as it was meant to, and one without torque has only its brake.
         let went_on = self.missed.contains(&Requirement::Latch);
         if !is_latched && (went_on || self.cut.is_none()) {
@@ -330,7 +329,7 @@ impl Observer for Judge {
             Message::Emergency(Node::Controller, Emergency { cause, .. })
                 if cause != Cause::None =>
             {
-                self.reports.take(time, cause, self.mode);
+                self.reports.take(time, cause);
             }
             Message::Feedback(feedback) => {
                 let open = self.newest.brake_open(time, feedback.status);
@@ -352,6 +351,7 @@ impl Observer for Judge {
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         let plant = &truth.plant;
         self.mode = truth.mind.mode;
+        self.reports.look(self.mode);
         let is_powered = self.is_powered();
         if is_powered && plant.tau == [0.0; 4] && self.last.is_some_and(|last| last.tau != [0.0; 4])
         {

@@ -79,23 +79,24 @@ impl Spells {
         lateness(&self.all, self.period)
     }
 
-    /// What is wrong with what the controller has told in the end: the first cause, or none. An arm without torque has nothing to latch, and
-    /// what is wrong with the link is told as drives that are not heard.
+    /// What is wrong with what the controller has told in the end: the first cause, or none. If the arm `was_off`, what is wrong with the link is
+    /// told as drives that are not heard.
     pub(super) fn judge_told(
         &self,
         told: Option<Cause>,
-        is_latched: bool,
+        was_off: bool,
         survived: bool,
     ) -> Option<Requirement> {
         let Some(cause) = told else {
-            let is_silent = !survived && !self.all.iter().any(causes::may_be_untold);
+            let may_be = |spell: &Spell| causes::may_be_untold(spell, was_off);
+            let is_silent = !survived && !self.all.iter().any(may_be);
             return is_silent.then_some(Requirement::Detected);
         };
         let begun = self.all.iter().filter(|spell| spell.from < Instant::MAX);
         let mut causes = begun.map(|spell| causes::of(spell.what));
         // An emergency stop is the operator's.
         let may_be = cause == Cause::EStop
-            || (cause == Cause::PeerSilent && !is_latched)
+            || (cause == Cause::PeerSilent && was_off)
             || causes.any(|causes| causes.is_none_or(|causes| causes.contains(&cause)));
         (!may_be).then_some(Requirement::Cause)
     }
