@@ -80,7 +80,7 @@ proptest! {
         let (plan, law) = (drive.coulomb_friction(&qd), drive.friction(&qd) - train.viscous.component_mul(&qd));
         for axis in 0..4 {
             let x = f64::from(qd[axis] / train.coulomb_eps[axis]).abs();
-            let apart = 0.2385f64.min(2.0 * (-2.0 * x).exp() + 2e-6);
+            let apart = 0.2385f64.min(2.0 * (-2.0 * x).exp() + 8e-7);
             let rounding = 4.0 * U * f64::from((train.viscous[axis] * qd[axis]).abs());
             let bound = apart * f64::from(train.coulomb[axis]) + rounding;
             let gap = f64::from(plan[axis] - law[axis]).abs();
@@ -121,7 +121,7 @@ proptest! {
             let (speed, eps) = (f64::from(qd[i]), f64::from(train.coulomb_eps[i]));
             f64::from(train.viscous[i]) * speed + f64::from(train.coulomb[i]) * (speed / eps).tanh()
         });
-        let bound = wide(&train.coulomb) * (1.5e-6 + 4.0 * U) + exact.abs() * (4.0 * U);
+        let bound = wide(&train.coulomb) * (4e-7 + 4.0 * U) + exact.abs() * (4.0 * U);
         assert_close("friction", &friction, &exact, &bound);
     }
 

@@ -100,11 +100,11 @@ fn square_root_is_correctly_rounded() {
 fn hyperbolic_tangent_keeps_its_error() {
     for x in sweep(12.0, 1_000_000) {
         let error = (f64::from(tanh(x)) - f64::from(x).tanh()).abs();
-        assert!(error <= 1.5e-6, "tanh({x:e}) is off by {error:e}");
+        assert!(error <= 4e-7, "tanh({x:e}) is off by {error:e}");
     }
 }
 
-/// Below 4 it is far from 1; from there on to where it is 1 by definition there is nothing between two of these numbers.
+/// Below 4 it is far from 1; above 8 it is 1 by definition. There is nothing between two of these numbers.
 #[test]
 fn hyperbolic_tangent_does_not_exceed_one() {
     for bits in 4.0f32.to_bits()..=8.0f32.to_bits() {
@@ -179,8 +179,7 @@ proptest! {
             prop_assert_eq!(tanh(-x).to_bits(), (-tanh(x)).to_bits());
             prop_assert!(tanh(x).abs() <= 1.0);
         } else {
-            prop_assert!(sin.is_nan() && cos.is_nan() && wrap(x).is_nan());
-            prop_assert_eq!(tanh(x).is_nan(), x.is_nan());
+            prop_assert!(sin.is_nan() && cos.is_nan() && wrap(x).is_nan() && tanh(x).is_nan());
         }
     }
 

@@ -188,10 +188,10 @@ fn actuation() {
             rotor_bound,
         );
 
-        // tanh 1.5e-6; the relative error of its argument is 3 u, of which at most 0.45 passes on; 4 u of the result.
+        // tanh 4e-7; the relative error of its argument is 3 u, of which at most 0.45 passes on; 4 u of the result.
         let friction = drive.friction(qd);
         let expected = row.vector::<4>("tau_fric");
-        let friction_bound = coulomb * (1.5e-6 + 2.0 * U) + expected.abs() * (6.0 * U);
+        let friction_bound = coulomb * (4e-7 + 2.0 * U) + expected.abs() * (6.0 * U);
         agree(&row, "tau_fric", friction, expected, friction_bound);
 
         let total = link + rotor + friction;

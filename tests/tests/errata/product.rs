@@ -324,12 +324,12 @@ pub(crate) fn drive_efforts(state: &State) -> Vector4<f64> {
     efforts.cast()
 }
 
-/// Error of those: 8 u of inertial and viscous efforts, and the 1.5e-6 of the controller's tanh of Coulomb friction.
+/// Error of those: 8 u of inertial and viscous efforts, and the 4e-7 of the controller's tanh of Coulomb friction.
 pub(crate) fn drive_bound(state: &State) -> f64 {
     let drive = Drive::new(&IRB_930.drive);
     let inertia: Matrix4<f64> = drive.rotor_inertia().cast();
     let viscous: Vector4<f64> = IRB_930.drive.viscous.cast();
     let coulomb: Vector4<f64> = IRB_930.drive.coulomb.cast();
     let smooth = inertia * state.qdd.abs() + viscous.component_mul(&state.qd.abs());
-    largest(&(smooth * (8.0 * U32) + coulomb * 1.5e-6))
+    largest(&(smooth * (8.0 * U32) + coulomb * 4e-7))
 }
