@@ -2,7 +2,7 @@
 
 use core::f32::consts::FRAC_PI_2;
 
-use nalgebra::{Matrix4, Vector4, Vector5};
+use nalgebra::{Vector3, Vector4, Vector5};
 
 use crate::mechanics::arm::{ArmModel, Payload};
 use crate::mechanics::dynamics::drive::Drive;
@@ -19,7 +19,7 @@ pub const TORQUE_SHARE: f32 = 0.95;
 /// Everything that depends on the payload, lumped once instead of in every tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Body {
-    /// Rigid links with payload.
+    /// Rigid links with payload, and the rotors of shoulder and lift, which only add to coefficients of theirs.
     pub lagrange: Lagrange,
     /// Motors, gears, coupling and friction.
     pub drive: Drive,
@@ -30,8 +30,9 @@ pub struct Body {
     pub planned_torque: Torques,
     /// How fast they change at the most (N m/s, lift N/s).
     pub torque_rate: Torques,
-    /// Rotor inertia seen at the joints, A^T Jm A.
-    rotor: Matrix4<f32>,
+    /// What is left of the rotor inertia seen at the joints, A^T Jm A: of the elbow, of the wrist (kg m^2), and between lift and wrist
+    /// (kg m).
+    rotor: Vector3<f32>,
     /// Inertia of each axis by itself with the elbow at a right angle, for laws without a model.
     pub nominal_inertia: Vector4<f32>,
 }
@@ -45,9 +46,10 @@ impl Body {
         let joint = arm.limits.effort.inf(&motors);
         let wrist = arm.drive.motor_torque_limit.w;
         let torque_limit = Torques::new(joint.x, joint.y, joint.z, joint.w, wrist);
+        let rotor = drive.rotor_inertia();
         let rise = &arm.limits.effort_rise_time;
         let mut body = Self {
-            lagrange: Lagrange::new(arm, payload),
+            lagrange: Lagrange::new(arm, payload).with_rotors(rotor.m11, rotor.m33),
             drive,
             torque_limit,
             planned_torque: torque_limit * TORQUE_SHARE,
@@ -58,7 +60,7 @@ impl Body {
                 torque_limit.w / rise.w,
                 torque_limit.a / rise.w,
             ),
-            rotor: drive.rotor_inertia(),
+            rotor: Vector3::new(rotor.m22, rotor.m44, rotor.m34),
             nominal_inertia: Vector4::zeros(),
         };
         let square = Trig::new(&Vector4::new(0.0, FRAC_PI_2, 0.0, 0.0));
@@ -68,7 +70,8 @@ impl Body {
 
     /// Inertia of each axis by itself, rotors included: the diagonal of the inertia matrix, kg m^2, lift kg.
     pub fn own_inertia(&self, trig: &Trig) -> Vector4<f32> {
-        self.lagrange.mass_matrix(trig).diagonal() + self.rotor.diagonal()
+        self.lagrange.mass_matrix(trig).diagonal()
+            + Vector4::new(0.0, self.rotor.x, 0.0, self.rotor.y)
     }
 
     /// Joint torque (N m, N m, N, N m) for accelerations alone: the inertia matrix, rotors included, times `qdd`.
@@ -92,10 +95,9 @@ impl Body {
     }
 
     fn with_rotors(&self, mut torque: Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
-        torque.x += self.rotor.m11 * qdd.x;
-        torque.y += self.rotor.m22 * qdd.y;
-        torque.z += self.rotor.m33 * qdd.z + self.rotor.m34 * qdd.w;
-        torque.w += self.rotor.m43 * qdd.z + self.rotor.m44 * qdd.w;
+        torque.y += self.rotor.x * qdd.y;
+        torque.z += self.rotor.z * qdd.w;
+        torque.w += self.rotor.z * qdd.z + self.rotor.y * qdd.w;
         torque
     }
 }

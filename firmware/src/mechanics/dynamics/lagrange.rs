@@ -48,9 +48,9 @@ pub struct Lagrange {
     arm1_tool: Coupling,
     /// Coefficients in k24(-theta4).
     arm2_tool: Coupling,
-    /// Mass that moves with the lift (kg).
+    /// Mass that moves with the lift, rotors included (kg).
     lift_mass: f32,
-    /// Its weight (N).
+    /// Weight on the lift (N).
     weight: f32,
 }
 
@@ -158,6 +158,14 @@ impl Lagrange {
             lift_mass,
             weight: lift_mass * arm.gravity,
         }
+    }
+
+    /// Adds inertias that move with the shoulder (kg m^2) or the lift (kg) alone, and weigh nothing.
+    #[must_use]
+    pub fn with_rotors(mut self, shoulder: f32, lift: f32) -> Self {
+        self.inertia.x += shoulder;
+        self.lift_mass += lift;
+        self
     }
 
     /// What depends on the position.
