@@ -249,14 +249,14 @@ impl Controller {
         let reference = &self.setpoint.reference;
         self.error = reference.q - q;
 
-        let mean_qd = mean_velocity(&before, reference, readings.steps, period);
+        let velocity_error = mean_velocity(&before, reference, readings.steps, period) - qd;
         let motion = Motion {
             q,
             qd,
             torque: measured_torque,
             setpoint: &self.setpoint,
-            mean_qd,
-            qd_ahead: qd + (self.setpoint.ahead.qd - mean_qd),
+            velocity_error,
+            qd_ahead: self.setpoint.ahead.qd - velocity_error,
             lead,
             period,
             elapsed: period * readings.steps as f32,
@@ -279,10 +279,10 @@ impl Controller {
             body: &self.body,
         };
         probe.end(Phase::Reference);
-        let (mut torque, model) = selection.torque(&input, &mut self.memory);
+        let output = selection.torque(&input, &mut self.memory);
         probe.end(Phase::Law);
         let corners = [selection.gains.observer, self.least_corner];
-        self.observer.update(&self.body, &motion, &model, corners);
+        self.observer.update(&self.body, &motion, &output, corners);
         let felt = self.observer.residual();
         if let Some(axis) = self.monitor.feels(felt)
             && !self.limp
@@ -293,6 +293,7 @@ impl Controller {
                 return self.react(felt);
             }
         }
+        let mut torque = output.torque;
         if self.limp {
             torque = of_shaft(torque);
         } else if selection.compensation == Compensation::Observer {

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mechanics::kinematics::Trig;
 
-pub use control_input::{ControlInput, Model, Motion, Task};
+pub use control_input::{ControlInput, Motion, Output, Task};
 pub use gains::Gains;
 
 /// What a law remembers between samples.
@@ -87,36 +87,32 @@ impl Selection {
         self.gains.check(period, command_delay, integrates)
     }
 
-    /// Joint torques for one sample, without those of the observer, and the model that it goes on with.
+    /// Joint torques for one sample, without those of the observer, and what it goes on with.
     // Out of line: so its instructions and its stack can be measured.
     #[inline(never)]
-    pub fn torque(&self, input: &ControlInput<'_>, memory: &mut Memory) -> (Vector4<f32>, Model) {
+    pub fn torque(&self, input: &ControlInput<'_>, memory: &mut Memory) -> Output {
         let ControlInput { motion, body, .. } = input;
         let gains = &self.gains;
         let trig = Trig::relative_in_line(&motion.q);
-        let couplings = body.lagrange.couplings(&trig);
-        let mut torque = match self.law {
+        // Begun here, so that what is known already does not take registers until the end.
+        let mut output = Output {
+            torque: Vector4::zeros(),
+            couplings: body.lagrange.couplings(&trig),
+            friction: body.drive.friction(&motion.setpoint.ahead.qd),
+        };
+        output.torque = match self.law {
             Law::KinematicJoint => kinematic_joint::torque(input, gains, memory),
             Law::KinematicTask => kinematic_task::torque(input, &trig, gains, memory),
             Law::Pid => pid::torque(input, gains, memory),
             Law::PdGravity => pd_gravity::torque(input, gains),
             Law::ComputedTorqueJoint => {
-                computed_torque::torque(input, &couplings, gains, self.compensation, memory)
+                computed_torque::torque(input, &output, gains, self.compensation, memory)
             }
             Law::ComputedTorqueTask => {
-                let position = (&trig, &couplings);
+                let position = (&trig, &output);
                 computed_torque_task::torque(input, position, gains, self.compensation, memory)
             }
         };
-        // For every law, as the observer counts with it. Last: its branches leave no register to anything that is still to be used.
-        let friction = body.drive.friction(&motion.setpoint.ahead.qd);
-        if self.law.takes_compensation() {
-            torque += friction;
-        }
-        let model = Model {
-            couplings,
-            friction,
-        };
-        (torque, model)
+        output
     }
 }

@@ -68,7 +68,7 @@ impl Controller {
             qd: qd.cast(),
             torque: Vector4::zeros(),
             setpoint: &setpoint,
-            mean_qd: wanted,
+            velocity_error: wanted - qd.cast(),
             qd_ahead: qd.cast(),
             lead: 0.0,
             period: 1e-3,
@@ -81,8 +81,8 @@ impl Controller {
             geometry: &ARM.geometry,
             body: &self.body,
         };
-        let (torque, _) = self.selection.torque(&input, &mut Memory::new());
-        torque.cast()
+        let output = self.selection.torque(&input, &mut Memory::new());
+        output.torque.cast()
     }
 }
 

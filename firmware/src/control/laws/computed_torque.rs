@@ -7,13 +7,12 @@
 use nalgebra::Vector4;
 use protocol::messages::Compensation;
 
-use super::{ControlInput, Gains, Memory, Motion};
-use crate::mechanics::dynamics::lagrange::Couplings;
+use super::{ControlInput, Gains, Memory, Motion, Output};
 
-/// Joint torques without friction, which [`Selection::torque`](super::Selection::torque) adds.
+/// Joint torques.
 pub fn torque(
     input: &ControlInput<'_>,
-    couplings: &Couplings,
+    model: &Output,
     gains: &Gains,
     compensation: Compensation,
     memory: &mut Memory,
@@ -23,23 +22,23 @@ pub fn torque(
     if compensation == Compensation::Integral {
         acceleration += memory.integrate(motion.error, motion) * gains.integral();
     }
-    realise(input, couplings, &acceleration)
+    realise(input, model, &acceleration)
 }
 
 /// Joint accelerations of the reference, corrected by its errors.
 pub(super) fn acceleration(motion: &Motion<'_>, gains: &Gains) -> Vector4<f32> {
     motion.setpoint.ahead.qdd
-        + motion.velocity_error() * gains.derivative()
+        + motion.velocity_error * gains.derivative()
         + motion.error * gains.proportional()
 }
 
-/// The torques that give the joints `acceleration` against the modelled forces without friction.
+/// The torques that give the joints `acceleration` against the modelled forces.
 #[inline(always)]
 pub(super) fn realise(
     input: &ControlInput<'_>,
-    couplings: &Couplings,
+    model: &Output,
     acceleration: &Vector4<f32>,
 ) -> Vector4<f32> {
     let ControlInput { motion, body, .. } = input;
-    body.frictionless(couplings, &motion.qd_ahead, acceleration)
+    body.frictionless(&model.couplings, &motion.qd_ahead, acceleration) + model.friction
 }

@@ -8,14 +8,13 @@
 use nalgebra::Vector4;
 use protocol::messages::Compensation;
 
-use super::{ControlInput, Gains, Memory, Task, computed_torque};
-use crate::mechanics::dynamics::lagrange::Couplings;
+use super::{ControlInput, Gains, Memory, Output, Task, computed_torque};
 use crate::mechanics::kinematics::Trig;
 
-/// Joint torques without friction, which [`Selection::torque`](super::Selection::torque) adds.
+/// Joint torques.
 pub fn torque(
     input: &ControlInput<'_>,
-    (trig, couplings): (&Trig, &Couplings),
+    (trig, model): (&Trig, &Output),
     gains: &Gains,
     compensation: Compensation,
     memory: &mut Memory,
@@ -32,5 +31,5 @@ pub fn torque(
     let acceleration = task.joint_space(&(desired - carried + pull), || {
         computed_torque::acceleration(motion, gains)
     });
-    computed_torque::realise(input, couplings, &acceleration)
+    computed_torque::realise(input, model, &acceleration)
 }

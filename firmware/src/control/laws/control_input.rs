@@ -33,8 +33,9 @@ pub struct Motion<'a> {
     pub torque: Vector4<f32>,
     /// What to follow, at the sampling instant and at the middle of the time in which the command will act.
     pub setpoint: &'a Setpoint,
-    /// Reference velocity through the same filter as `qd`, so that the two compare without a delay.
-    pub mean_qd: Vector4<f32>,
+    /// Velocity error over the last sample: reference velocity through the same filter as `qd`, so that the two compare without a
+    /// delay, minus `qd`.
+    pub velocity_error: Vector4<f32>,
     /// Measured velocities, extrapolated to that time by the change of the reference in the meantime.
     pub qd_ahead: Vector4<f32>,
     /// From the sampling instant to the middle of that time, s.
@@ -50,9 +51,9 @@ pub struct Motion<'a> {
 }
 
 impl Motion<'_> {
-    /// Velocity error over the last sample.
-    pub fn velocity_error(&self) -> Vector4<f32> {
-        self.mean_qd - self.qd
+    /// Mean reference velocity over the last sample.
+    pub fn mean_qd(&self) -> Vector4<f32> {
+        self.qd + self.velocity_error
     }
 }
 
@@ -88,7 +89,7 @@ impl Task {
                 -joint.z,
                 wrap(joint.x + joint.y - joint.w),
             ),
-            velocity: desired.task_velocity(&motion.mean_qd) - actual.task_velocity(&motion.qd),
+            velocity: desired.task_velocity(&motion.mean_qd()) - actual.task_velocity(&motion.qd),
             desired,
             actual,
         }
@@ -113,9 +114,11 @@ impl Task {
     }
 }
 
-/// What laws and observer have in common of M(q) qdd + C qd + g + friction = tau in one sample.
+/// What a law gives in one sample, and what it has in common with the observer of M(q) qdd + C qd + g + friction = tau.
 #[derive(Clone, Copy, Debug)]
-pub struct Model {
+pub struct Output {
+    /// Joint torques without those of the observer: N m, N m, N, N m.
+    pub torque: Vector4<f32>,
     /// Inertia at the measured position.
     pub couplings: Couplings,
     /// Friction of the planned motion in the time in which the command will act: that of the measured one would chatter around

@@ -13,5 +13,5 @@ pub fn torque(input: &ControlInput<'_>, gains: &Gains, memory: &mut Memory) -> V
 
 /// Joint velocities that the law asks for.
 pub(super) fn velocity(motion: &Motion<'_>, gains: &Gains) -> Vector4<f32> {
-    motion.mean_qd + motion.error * velocity_loop::outer_gain(gains)
+    motion.mean_qd() + motion.error * velocity_loop::outer_gain(gains)
 }

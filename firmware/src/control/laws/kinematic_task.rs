@@ -17,7 +17,7 @@ pub fn torque(
     memory: &mut Memory,
 ) -> Vector4<f32> {
     let task = Task::new(input, trig);
-    let velocity = task.desired.task_velocity(&input.motion.mean_qd)
+    let velocity = task.desired.task_velocity(&input.motion.mean_qd())
         + task.position * velocity_loop::outer_gain(gains);
     let command = task.joint_space(&velocity, || kinematic_joint::velocity(input.motion, gains));
     velocity_loop::torque(&command, input, gains, memory)

@@ -8,7 +8,7 @@
 
 use nalgebra::Vector4;
 
-use super::{Model, Motion};
+use super::{Motion, Output};
 use crate::mechanics::body::Body;
 
 /// State of the observer.
@@ -56,11 +56,11 @@ impl MomentumObserver {
         &mut self,
         body: &Body,
         motion: &Motion<'_>,
-        model: &Model,
+        law: &Output,
         [corner, least]: [f32; 2],
     ) {
         let period = motion.period;
-        let couplings = &model.couplings;
+        let couplings = &law.couplings;
         let bias = couplings.bias(&motion.qd_ahead);
         let kinetic_gradient = couplings.kinetic_gradient(&motion.qd);
         // Velocities are means over a sample and stand for its middle. The inertia is that of its end: half a sample of the
@@ -83,7 +83,7 @@ impl MomentumObserver {
         self.previous_torque = motion.torque;
         // Each was that of an instant ahead of its sample: the one between them is at the end of the last sample.
         let [last, before] = self.friction;
-        self.friction = [model.friction, last];
+        self.friction = [law.friction, last];
         let share = motion.lead / period;
         let friction = last + (before - last) * if share < 1.0 { share } else { 1.0 };
         let mut unknown = torque + kinetic_gradient - friction;

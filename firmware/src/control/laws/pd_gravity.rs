@@ -11,6 +11,6 @@ use super::{ControlInput, Gains};
 pub fn torque(input: &ControlInput<'_>, gains: &Gains) -> Vector4<f32> {
     let motion = input.motion;
     let acceleration =
-        motion.error * gains.proportional() + motion.velocity_error() * gains.derivative();
+        motion.error * gains.proportional() + motion.velocity_error * gains.derivative();
     input.body.nominal_inertia.component_mul(&acceleration) + input.body.lagrange.gravity()
 }

@@ -11,7 +11,7 @@ pub fn torque(input: &ControlInput<'_>, gains: &Gains, memory: &mut Memory) -> V
     let error = motion.error;
     let integral = memory.integrate(error, motion);
     let acceleration = error * gains.proportional()
-        + motion.velocity_error() * gains.derivative()
+        + motion.velocity_error * gains.derivative()
         + integral * gains.integral();
     input.body.nominal_inertia.component_mul(&acceleration)
 }
