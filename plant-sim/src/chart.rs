@@ -109,13 +109,13 @@ pub(crate) struct Tick {
 /// Round values between two bounds, about `count` of them: steps of 1, 2 or 5 times a power of ten.
 pub(crate) fn ticks(low: f64, high: f64, count: u32) -> Vec<Tick> {
     let rough = (high - low) / f64::from(count);
-    let power = 10_f64.powf(rough.log10().floor());
+    let power = libm::pow(10.0, libm::log10(rough).floor());
     let step = [1.0, 2.0, 5.0, 10.0]
         .map(|factor| factor * power)
         .into_iter()
         .find(|step| *step >= rough)
         .unwrap_or(10.0 * power);
-    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    let decimals = (-libm::log10(step).floor()).max(0.0) as usize;
     let first = (low / step).ceil() as i64;
     let last = (high / step).floor() as i64;
     (first..=last)

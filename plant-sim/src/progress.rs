@@ -1,9 +1,8 @@
 //! Progress of a run or a campaign on standard error.
 
-use std::io::{self, IsTerminal as _};
+use std::io::{self, IsTerminal as _, Write as _};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sim::observer::Observer;
 use sim::world::CellEvent;
 
@@ -11,6 +10,8 @@ use crate::say;
 
 /// Runs that are over sooner need none.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// Between two lines on a terminal, each over the last.
+const BLINK: Duration = Duration::from_millis(100);
 /// Between two lines of a run where there is no terminal.
 const PAUSE: Duration = Duration::from_secs(2);
 /// The same of a campaign, whose lines a log keeps.
@@ -24,9 +25,10 @@ pub struct Progress {
     total: u64,
     done: u64,
     begun: Instant,
-    /// When the last line was written, where there is no terminal.
+    /// When the last line was written.
     said: Instant,
-    bar: Option<ProgressBar>,
+    /// Whether it stands on a terminal.
+    is_shown: bool,
 }
 
 impl Progress {
@@ -54,7 +56,7 @@ impl Progress {
             done: 0,
             begun: now,
             said: now,
-            bar: None,
+            is_shown: false,
         }
     }
 
@@ -68,32 +70,27 @@ impl Progress {
         if self.begun.elapsed() < PATIENCE {
             return;
         }
-        if io::stderr().is_terminal() {
-            let (unit, total, begun) = (self.unit, self.total, self.begun);
-            let bar = self.bar.get_or_insert_with(|| bar(unit, total, begun));
-            bar.set_position(self.done);
-        } else if self.said.elapsed() >= self.pause {
-            self.said = Instant::now();
-            let left = self.begun.elapsed().as_secs_f64() / self.done as f64
-                * (self.total - self.done) as f64;
-            say!(
-                "{} {} of {}, {left:.0} s left",
-                self.unit,
-                self.done,
-                self.total
-            );
+        let is_terminal = io::stderr().is_terminal();
+        if self.said.elapsed() < if is_terminal { BLINK } else { self.pause } {
+            return;
+        }
+        self.said = Instant::now();
+        let (unit, done, total) = (self.unit, self.done, self.total);
+        let left = self.begun.elapsed().as_secs_f64() / done as f64 * (total - done) as f64;
+        let line = format!("{unit} {done} of {total}, {left:.0} s left");
+        if is_terminal {
+            over(&line);
+            self.is_shown = true;
+        } else {
+            say!("{line}");
         }
     }
 }
 
-fn bar(unit: &str, total: u64, begun: Instant) -> ProgressBar {
-    let template = format!("{{wide_bar}} {unit} {{human_pos}} of {{human_len}}, {{eta}} left");
-    let style = ProgressStyle::with_template(&template)
-        .expect("the template is valid")
-        .progress_chars("=> ");
-    ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr())
-        .with_style(style)
-        .with_elapsed(begun.elapsed())
+/// Writes over the line of the terminal.
+fn over(line: &str) {
+    // There is nobody else to say it to.
+    let _ = write!(io::stderr(), "\r{line}\x1b[K");
 }
 
 impl Observer for Progress {
@@ -107,8 +104,8 @@ impl Observer for Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         // The summary takes its place.
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
+        if self.is_shown {
+            over("");
         }
     }
 }

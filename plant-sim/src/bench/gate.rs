@@ -128,7 +128,7 @@ impl Case {
             stroke_deg,
             ..
         } = self.gate;
-        let (sin, cos) = stroke_deg.to_radians().sin_cos();
+        let (sin, cos) = libm::sincos(stroke_deg.to_radians());
         [-HALF_STROKE, HALF_STROKE].map(|half| [radius_m + half * cos, half * sin, Z, 0.0])
     }
 

@@ -239,7 +239,7 @@ impl Watch {
 
 /// Horizontal distance of two places.
 fn across(a: &[f64; 4], b: &[f64; 4]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 impl Observer for Watch {

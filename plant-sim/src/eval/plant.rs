@@ -72,7 +72,7 @@ impl Side for PlantSide {
                 ik_cells(
                     solutions,
                     posture.elbow,
-                    a1 * a2 * theta2.sin(),
+                    a1 * a2 * libm::sin(theta2),
                     theta2_tolerance(theta2),
                 )
             }

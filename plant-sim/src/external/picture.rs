@@ -55,7 +55,7 @@ fn micros(time: Duration) -> f64 {
 
 /// Position of a time on its axis; below 1 us it is at the start.
 fn x(us: f64) -> f64 {
-    LEFT + WIDTH * (us.max(1.0).log10() / DECADES).min(1.0)
+    LEFT + WIDTH * (libm::log10(us.max(1.0)) / DECADES).min(1.0)
 }
 
 fn row(page: &mut Svg, top: f64, name: &str, times: &Distribution, timing: &Timing) {
@@ -63,13 +63,13 @@ fn row(page: &mut Svg, top: f64, name: &str, times: &Distribution, timing: &Timi
     let right = LEFT + WIDTH;
     let mut bars = vec![0u64; BARS * DECADES as usize + 1];
     for (time, count) in times.classes() {
-        let bar = micros(time).max(1.0).log10() * BARS as f64;
+        let bar = libm::log10(micros(time).max(1.0)) * BARS as f64;
         bars[(bar as usize).min(BARS * DECADES as usize)] += count;
     }
     // Scaled so that a single sample is still a visible bar.
     let most = bars.iter().copied().max().unwrap_or(0).max(1) as f64;
-    let decades = (most.log10().floor() + 1.0).max(1.0);
-    let y = |count: f64| bottom - HEIGHT * (count.log10() + 0.3).max(0.0) / (decades + 0.3);
+    let decades = (libm::log10(most).floor() + 1.0).max(1.0);
+    let y = |count: f64| bottom - HEIGHT * (libm::log10(count) + 0.3).max(0.0) / (decades + 0.3);
     page.text(LEFT, top - 8.0, r#"font-weight="bold""#, name);
     let quantiles = format!(
         "50 % {:.0} us, 99.9 % {:.0} us, max {:.0} us",
@@ -86,7 +86,7 @@ fn row(page: &mut Svg, top: f64, name: &str, times: &Distribution, timing: &Timi
         page.text(LEFT - 6.0, at + 4.0, style, &count.to_string());
     }
     for (bar, &count) in bars.iter().enumerate().filter(|(_, count)| **count > 0) {
-        let left = x(10f64.powf(bar as f64 / BARS as f64));
+        let left = x(libm::pow(10.0, bar as f64 / BARS as f64));
         let (top, width) = (y(count as f64), WIDTH / DECADES / BARS as f64 - 1.0);
         let style = r##"fill="#3b6ea5""##;
         page.rectangle([left, top, width, bottom - top], style);

@@ -121,7 +121,7 @@ pub(super) fn transforms(time: Timestamp, geometry: &Geometry, q: &[f64; 4]) -> 
 
 /// About the vertical.
 fn turn(angle: f64) -> Quaternion {
-    let (z, w) = (angle / 2.0).sin_cos();
+    let (z, w) = libm::sincos(angle / 2.0);
     Quaternion {
         x: 0.0,
         y: 0.0,
@@ -132,7 +132,7 @@ fn turn(angle: f64) -> Quaternion {
 
 /// About the vertical, then upside down, as the flange is.
 fn turn_downwards(angle: f64) -> Quaternion {
-    let (y, x) = (angle / 2.0).sin_cos();
+    let (y, x) = libm::sincos(angle / 2.0);
     Quaternion {
         x,
         y,

@@ -68,8 +68,8 @@ fn gate(robot: &RobotModel, random: &mut Rand64) -> Option<Gate> {
     let z = between([low, high]);
     let other = z + between([-STEP, STEP]);
     let top = z.max(other) + between(RISE);
-    let (sin, cos) = place.sin_cos();
-    let (along, across) = (direction.cos(), direction.sin());
+    let (sin, cos) = libm::sincos(place);
+    let (across, along) = libm::sincos(direction);
     let end = |side: f64, z, yaw| {
         let half = side * stroke / 2.0;
         [
@@ -126,7 +126,7 @@ impl Gate {
     /// Length of the stroke, m.
     pub(super) fn stroke(&self) -> f64 {
         let [a, b] = self.ends;
-        (a[0] - b[0]).hypot(a[1] - b[1])
+        libm::hypot(a[0] - b[0], a[1] - b[1])
     }
 
     /// What a run is measured against.
