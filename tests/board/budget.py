@@ -22,7 +22,7 @@ LAW_FUNCTION = "Selection::torque"
 HERE = pathlib.Path(__file__).parent
 FIGURES = HERE / "budget.csv"
 FLASH, RAM, STACK, LAW_STACK = 128 * 1024, 16 * 1024, 4096, 260
-SAMPLE, CALL, LAW, JOINT_LAW = 3000, 4000, 700, 430
+SAMPLE, CALL, LAW, JOINT_LAW = 3000, 4000, 680, 330
 GOALS = {
     "flash": FLASH, "ram": RAM, "stack_used": STACK, "stack_bound": STACK, "law_stack": LAW_STACK,
     "sample_max": SAMPLE, "sample_planning_max": CALL, "other_frame_max": CALL, "no_frame_max": CALL,
