@@ -59,3 +59,16 @@ fn it_stays_finite() {
         assert!(after(10, |_| pull).abs() <= 300.0, "{pull}");
     }
 }
+
+/// However long the time that is accounted for at once, and however heavy the mass meanwhile: it comes nearer, and is never past it.
+#[test]
+fn no_gap_makes_it_overshoot() {
+    for time in [0.01, 0.1, 1.0, 10.0] {
+        for heavier in [0.5, 1.0, 3.0, 6.0] {
+            let mut burden = Burden::new();
+            burden.account(2.0 * heavier * GRAVITY, GRAVITY, heavier, time);
+            let mass = burden.mass();
+            assert!(0.0 < mass && mass < 2.0001, "{mass} kg in {time} s");
+        }
+    }
+}
