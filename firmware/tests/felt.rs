@@ -238,3 +238,18 @@ fn samples_are_missed_at_once_or_not_at_all() {
         "{found:?}"
     );
 }
+
+/// What need not be explained, to the last bit, ends what has begun to be felt.
+#[test]
+fn what_is_felt_has_to_go_on() {
+    let mut monitor = monitor();
+    let explained = IRB_930.limits.effort * MonitorLimits::DEFAULT.collision;
+    let rest = Vector4::zeros();
+    let numbers = [&rest, &rest, &FORCE, &ERROR, &rest];
+    for _ in 0..10 {
+        let axis = monitor.feels(&FORCE).expect("it is felt");
+        let found = monitor.felt(axis, &readings(1, RUN, [0.0; 4]), numbers);
+        assert_eq!(found, Felt::Nothing);
+        assert_eq!(monitor.feels(&explained), None);
+    }
+}

@@ -148,13 +148,13 @@ impl Monitor {
         Some(Fault::value(cause, f32::from(status.bits()), 0.0))
     }
 
-    /// Judges one sample; `error` is reference minus measured position, `before` that of the last sample, and `last_qd` its velocity.
+    /// Judges one sample; `error` is reference minus measured position, and `before` that of the last sample.
     pub fn check(
         &mut self,
         readings: &Readings,
         q: &Vector4<f32>,
         qd: &Vector4<f32>,
-        [error, before, last_qd]: [&Vector4<f32>; 3],
+        [error, before]: [&Vector4<f32>; 2],
     ) -> Option<Fault> {
         if is_within(error, &self.following_error)
             && is_within(qd, &self.speed)
@@ -163,7 +163,7 @@ impl Monitor {
             (self.following_count, self.speed_count, self.range_count) = (0, 0, 0);
             return None;
         }
-        self.trip(readings, [q, qd, error, before, last_qd])
+        self.trip(readings, [q, qd, error, before])
     }
 
     /// Judges the axes of the shaft alone, by the same error, where the others are without torque.
@@ -186,14 +186,12 @@ impl Monitor {
     fn trip(
         &mut self,
         readings: &Readings,
-        [q, qd, error, before, last_qd]: [&Vector4<f32>; 5],
+        [q, qd, error, before]: [&Vector4<f32>; 4],
     ) -> Option<Fault> {
         let speed = first_beyond(qd, &self.speed);
         let range = first_beyond(&(q - self.middle), &self.reach);
         // A jump shows as a speed beyond its limit, if not as a following error.
-        if let Some(fault) = self.jumped(&(error - before), readings.steps)
-            && !self.missed(readings, qd, last_qd)
-        {
+        if let Some(fault) = self.jumped(&(error - before), readings.steps) {
             return Some(fault);
         }
         if self.following_count == 0 {
