@@ -3,10 +3,13 @@
 use firmware::mechanics::arm::IRB_930;
 use firmware::mechanics::dynamics::drive::Drive;
 use nalgebra::Vector4;
-use protocol::messages::{Cause, Mode, MotionRequest, Outcome};
+use protocol::messages::{Cause, ControlWord, Mode, MotionRequest, Outcome};
 
-use crate::bench::{Bench, by_itself};
+use crate::bench::{Bench, by_itself, estop};
 use crate::manual::here;
+
+/// Of the motor of the lift, whose screw rises by 25 mm in a turn, N m.
+const PER_NEWTON: f32 = 0.025 / std::f32::consts::TAU;
 
 /// Ahead of its reference or behind, by a third of what it moves in a sample.
 #[test]
@@ -69,17 +72,60 @@ fn samples_that_nobody_has_counted_are_caught_up() {
 /// asks for the same.
 #[test]
 fn torques_are_reported_in_thousandths_of_the_rated_ones() {
-    let per_newton = 0.025 / std::f32::consts::TAU;
     for load in [0.0, 40.0, -30.0] {
         let mut bench = Bench::enabled();
         // Besides the 1.95 kg of lift and shaft.
-        let torque = -(1.95 * 9.81 + load) * per_newton;
+        let torque = -(1.95 * 9.81 + load) * PER_NEWTON;
         bench.torque[2] = (torque / 1.27 * 1e3).round() as i16;
         bench.run(500);
         let found = bench.command().torque[2];
         // Half a thousandth.
         assert!((found - torque).abs() < 0.5e-3 * 1.27, "{found} {torque}");
     }
+}
+
+/// A mass that nobody has announced, by its weight and its inertia on strokes of the lift: a mean with a time constant of one second, in which the time of
+/// a sample counts as much as it is heavier. What is without torque is not weighed, and not forgotten.
+#[test]
+fn what_the_lift_carries_is_weighed() {
+    let mass = 10.0;
+    let mut bench = Bench::with(by_itself());
+    let rated = IRB_930.drive.motor_torque_rated;
+    // At rest it carries itself.
+    bench.torque[2] = (-1.95 * 9.81 * PER_NEWTON / rated.z * 1e3) as i16;
+    bench.enable();
+    bench.follows = true;
+    let mut heights = [0.28, 0.02].into_iter().cycle();
+    for sample in 1..=5000 {
+        if bench.node.controller().queued() == 0 {
+            let mut target: [f32; 4] = here(&bench).into();
+            target[2] = heights.next().unwrap();
+            let frame = bench.motion(MotionRequest::MoveJoint { target, speed: 0.5 });
+            bench.wire.to_node.push_back(frame);
+        }
+        let mut torque = Vector4::from(bench.command().torque);
+        let controller = bench.node.controller();
+        let lift = controller.reference();
+        torque.z -= mass * (9.81 - lift.qdd.z) * PER_NEWTON;
+        bench.torque = torque
+            .component_div(&rated)
+            .map(|share| (share * 1e3).round() as i16)
+            .into();
+        let heavier = sample as f32 * 1e-3 - lift.qd.z / 9.81;
+        let expected = mass * (1.0 - (-heavier).exp());
+        let found = controller.burden();
+        // The observer lags, and not every sample is weighed.
+        assert!(
+            (found - expected).abs() < 0.03 * mass,
+            "{sample}: {found} {expected} kg"
+        );
+    }
+    bench.wire.to_node.push_back(estop());
+    bench.run(1000);
+    assert_eq!(bench.command().control, ControlWord::ESTOP);
+    let found = bench.node.controller().burden();
+    bench.run(1000);
+    assert_eq!(bench.node.controller().burden(), found);
 }
 
 /// One whose encoder is wrong is driven away by its loop, faster and faster; one that something takes away from its reference is not.

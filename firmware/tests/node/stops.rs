@@ -92,6 +92,34 @@ fn the_lift_is_held_where_an_axis_of_the_arm_must_be_without_torque() {
     }
 }
 
+/// One that moves by less than 0.2 m/s is held where it is; a faster one cannot be stopped there, and follows the path of its stop.
+#[test]
+fn a_slow_lift_is_held_where_it_is_when_the_arm_fails() {
+    for (speed, is_held) in [(0.15, true), (0.25, false)] {
+        for target in [0.02, 0.28] {
+            let mut bench = Bench::with(by_itself());
+            bench.enable();
+            bench.follows = true;
+            let target = [0.2, 1.5, target, 0.3];
+            let stroke = bench.motion(MotionRequest::MoveJoint { target, speed: 0.2 });
+            bench.wire.to_node.push_back(stroke);
+            let lift = |bench: &Bench| bench.node.controller().reference().qd.z.abs();
+            let reached = (0..1000).find(|_| {
+                bench.step();
+                lift(&bench) >= speed
+            });
+            assert!(reached.is_some() && lift(&bench) < speed + 0.04);
+            let before = *bench.node.controller().reference();
+            jump(&mut bench, 1);
+            bench.run(30);
+            assert_eq!(bench.node.controller().cause(), Cause::EncoderFault);
+            let way = bench.node.controller().reference().q.z - before.q.z;
+            assert_eq!(way == 0.0, is_held, "{way} m");
+            assert!(way * before.qd.z >= 0.0, "{way} m");
+        }
+    }
+}
+
 /// The faulty drive may be the one of the lift: then only the brake holds it.
 #[test]
 fn a_drive_in_fault_closes_the_brake_first() {
