@@ -190,6 +190,24 @@ fn an_emergency_stop_is_latched() {
     assert_eq!(bench.mode(), Mode::Ready);
 }
 
+/// The brake takes 60 ms to open. Until the drives are first on they may be late; then they have to stay on.
+#[test]
+fn drives_that_let_go_while_the_brake_opens_are_told_at_once() {
+    for late in [0, 20] {
+        let (mut bench, _) = Bench::asked_to_enable();
+        bench.obeys = false;
+        bench.run(1 + late);
+        bench.obeys = true;
+        bench.run(20);
+        let controller = bench.node.controller();
+        let found = (controller.mode(), controller.cause());
+        assert_eq!(found, (Mode::Enabling, Cause::None));
+        bench.obeys = false;
+        bench.step();
+        assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
+    }
+}
+
 #[test]
 fn a_peer_that_goes_silent_during_an_emergency_stop_leaves_no_torque() {
     let mut bench = Bench::enabled();
