@@ -190,6 +190,25 @@ fn an_emergency_stop_is_latched() {
     assert_eq!(bench.mode(), Mode::Ready);
 }
 
+/// It may be moved by hand, but needs sound drives, and encoders that do not jump.
+#[test]
+fn an_arm_that_is_ready_is_watched() {
+    let fault = |bench: &mut Bench| bench.status = bench.status | DriveStatus::FAULT;
+    let jumped = |bench: &mut Bench| bench.shove(0.1);
+    for harm in [fault, jumped] {
+        let mut bench = Bench::new();
+        bench.hello(table::HASH);
+        for _ in 0..20 {
+            bench.shove(0.02);
+            bench.step();
+        }
+        assert_eq!(bench.mode(), Mode::Ready);
+        harm(&mut bench);
+        bench.step();
+        assert_ne!(bench.mode(), Mode::Ready);
+    }
+}
+
 /// The brake takes 60 ms to open. Until the drives are first on they may be late; then they have to stay on.
 #[test]
 fn drives_that_let_go_while_the_brake_opens_are_told_at_once() {
