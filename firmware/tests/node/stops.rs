@@ -3,7 +3,7 @@
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
 use protocol::messages::{
-    Cause, ControlWord, DriveStatus, FaultAxis, Mode, MotionRequest, Outcome,
+    Cause, ControlWord, DriveStatus, FaultAxis, Message, Mode, MotionRequest, Outcome,
 };
 
 use crate::bench::{Bench, PERIOD, by_itself, estop, is_off};
@@ -199,6 +199,19 @@ fn torque_that_drives_take_again_for_a_stop_builds_up() {
             "{sample}: {found} N m, {built_up}"
         );
     }
+}
+
+/// An emergency stop keeps its cause: that the brake does not close is told all the same, once.
+#[test]
+fn a_brake_that_does_not_close_after_an_emergency_stop_is_told() {
+    let mut bench = Bench::enabled();
+    bench.status = bench.status | DriveStatus::BRAKE_RELEASED;
+    bench.wire.to_node.push_back(estop());
+    let sent = bench.run(1000);
+    let told = sent.iter().filter(
+        |message| matches!(message, Message::Emergency(_, it) if it.cause == Cause::DriveFault),
+    );
+    assert_eq!(told.count(), 1);
 }
 
 /// A stop that the arm does not follow closes the brake; if it does not follow even then, its torque goes off.
