@@ -261,7 +261,7 @@ impl TorqueBudget<'_> {
     }
 
     /// Bounds of a vertical stroke of a jump, up or down, over at most `height` m. Friction takes from the force that speeds
-    /// up, and adds to the one that brakes, the more the faster it goes.
+    /// up, the more the faster it goes; dry friction adds to the one that brakes.
     #[inline(never)]
     pub fn lift(&self, height: f32, down: bool) -> Bounds {
         let limits = &self.arm.limits;
@@ -296,22 +296,17 @@ impl TorqueBudget<'_> {
         for _ in 0..4 {
             peak = peak.min((square * peak * peak + height) / (2.0 * square * peak + linear));
         }
-        // Speed that a ramp to or from an acceleration takes, and what friction is at the speed before one.
-        let ramp = |acceleration: f32| 0.5 * acceleration * acceleration / jerk;
-        let at_speed = |acceleration: f32| viscous * (peak - ramp(acceleration)).max(0.0);
+        // Speed that a ramp takes.
+        let ramp = 0.5 * up * up / jerk;
         Bounds {
             speed,
             jerk,
             accelerate: HalfBounds {
                 jerk,
-                slow: within(lifting - viscous * ramp(up).min(peak)),
-                fast: within(lifting - at_speed(up)),
+                slow: within(lifting - viscous * ramp.min(peak)),
+                fast: within(lifting - viscous * (peak - ramp).max(0.0)),
             },
-            brake: HalfBounds {
-                jerk,
-                slow: back,
-                fast: within(braking + at_speed(back)),
-            },
+            brake: HalfBounds::even(back, jerk),
         }
     }
 }
