@@ -38,6 +38,13 @@ fn readings(steps: u32, velocity: [f32; 4], torque: [f32; 4]) -> Readings {
     }
 }
 
+/// What is felt, most of it by this axis.
+fn felt_by(axis: Axis) -> Vector4<f32> {
+    let mut force = FORCE;
+    force[axis as usize] *= 4.0;
+    force
+}
+
 /// Motors at these velocities, rad/s, in the first sample and the next, torques of these signs in that, and joints that were to move like this and
 /// are to now, and do. Returns the cause and the axis that is named.
 fn verdict(
@@ -47,20 +54,21 @@ fn verdict(
     [before, now, found]: [[f32; 4]; 3],
 ) -> (Cause, Axis) {
     let mut monitor = monitor();
+    let force = felt_by(axis);
     let [before, now, found] = [before, now, found].map(Vector4::from);
     // Two steps: nothing is missing.
     let first = readings(2, motors[0], [0.0; 4]);
-    let numbers = [&before, &before, &FORCE, &ERROR, &before];
+    let numbers = [&before, &before, &force, &ERROR, &before];
     assert_eq!(monitor.felt(axis, &first, numbers), Felt::Nothing);
     let second = readings(2, motors[1], torque);
-    let numbers = [&found, &before, &FORCE, &ERROR, &now];
+    let numbers = [&found, &before, &force, &ERROR, &now];
     let Felt::Fault(fault) = monitor.felt(axis, &second, numbers) else {
         panic!("it is felt");
     };
     let named = Axis::ALL.into_iter().find(|it| fault.axis == (*it).into());
     let named = named.expect("an axis");
     let value = if fault.cause == Cause::Collision {
-        &FORCE
+        &force
     } else {
         &ERROR
     };
@@ -84,7 +92,7 @@ fn an_encoder_that_stands_is_stuck() {
             Axis::Shoulder,
             [still, still],
             0.115,
-            (Cause::Collision, Axis::Elbow),
+            (Cause::Collision, Axis::Shoulder),
         ),
         // One that turns back stands for an instant only.
         (
@@ -118,7 +126,7 @@ fn an_encoder_that_stands_is_stuck() {
 #[test]
 fn an_encoder_that_goes_back_is_reversed() {
     let reversed = (Cause::EncoderFault, Axis::Elbow);
-    let obstacle = (Cause::Collision, Axis::Elbow);
+    let obstacle = (Cause::Collision, Axis::Shoulder);
     for (before, now, found, expected) in [
         (1.0, 0.9, -0.76, reversed),
         (1.0, 0.9, -0.74, obstacle),
@@ -143,7 +151,7 @@ fn an_encoder_that_goes_back_is_reversed() {
 #[test]
 fn an_axis_that_runs_away_from_its_torque_has_a_wrong_encoder() {
     let away = (Cause::EncoderFault, Axis::Shoulder);
-    let obstacle = (Cause::Collision, Axis::Elbow);
+    let obstacle = (Cause::Collision, Axis::Shoulder);
     for (motors, torque, now, expected) in [
         ([10.0, 13.0], -1.0, 0.8, away),
         ([10.0, 13.0], -1.0, -0.8, away),
