@@ -135,6 +135,12 @@ pub struct Trajectory {
     pub time_scale: f32,
     /// Joint positions at the end.
     pub end: Vector4<f32>,
+    /// How far from the end the arm may leave the path for the next one, m; 0 where it stops there.
+    pub zone: f32,
+    /// For how long the next move has begun when this one ends, s.
+    pub overlap: f32,
+    /// Greatest speed of the flange along a curve that was asked for, m/s; 0 for any.
+    pub tool_speed: f32,
     /// Sequence number that the operator gave the move.
     pub sequence: u8,
 }
@@ -143,6 +149,11 @@ impl Trajectory {
     /// Time from rest to rest, s.
     pub fn duration(&self) -> f32 {
         self.span / self.time_scale
+    }
+
+    /// Time at which the next move begins, s.
+    pub(super) fn next_begins(&self) -> f32 {
+        self.duration() - self.overlap
     }
 
     /// Reference at `t` seconds after the start, held at both ends.
@@ -168,6 +179,31 @@ impl Trajectory {
         setpoint: &mut Setpoint,
     ) -> Result<(), PathError> {
         self.evaluate(arm, t, Some(lead), setpoint)
+    }
+
+    /// Adds the motion of the next move, at its time `t`, to that of this one.
+    ///
+    /// # Errors
+    /// As [`Trajectory::at`].
+    // Out of line: few samples are in an overlap.
+    #[inline(never)]
+    pub(super) fn add(
+        &self,
+        next: &Self,
+        arm: &ArmModel,
+        t: f32,
+        lead: f32,
+        setpoint: &mut Setpoint,
+    ) -> Result<(), PathError> {
+        let mut more = Setpoint::rest(self.end);
+        next.follow(arm, t, lead, &mut more)?;
+        let Setpoint { reference, ahead } = setpoint;
+        reference.q += more.reference.q - self.end;
+        reference.qd += more.reference.qd;
+        reference.qdd += more.reference.qdd;
+        ahead.qd += more.ahead.qd;
+        ahead.qdd += more.ahead.qdd;
+        Ok(())
     }
 
     /// With or without a look ahead, in one copy. Into place: what is returned would be copied on the way.

@@ -49,6 +49,7 @@ impl<'a> Run<'a> {
             target,
             speed,
             tool_speed: 0.0,
+            zone: 0.0,
         };
         queue.push(request).unwrap();
         while queue.has_to_plan() {
@@ -315,6 +316,7 @@ fn ride(from: &Vector4<f32>, to: &Vector4<f32>, ride: &Ride) -> Result<(), TestC
         target: Target::Joints(second),
         speed: 1.0,
         tool_speed: 0.0,
+        zone: 0.0,
     };
     run.queue.push(request).unwrap();
     while run.queue.has_to_plan() {

@@ -42,6 +42,8 @@ const ANY: Kind = range(f32::MIN, f32::MAX);
 const COORDINATE: Kind = range(-100.0, 100.0);
 /// Beyond any speed of such a tool, m/s.
 const TOOL_SPEED: Kind = range(0.0, 100.0);
+/// Around the end of a move, m.
+const ZONE: Kind = range(0.0, 1.0);
 const FRACTION: Kind = range(0.0, 1.0);
 const CAUSE: Kind = Kind::Code(Cause::CODES);
 const ELBOW: Kind = Kind::Code(ElbowSide::CODES);
@@ -124,17 +126,20 @@ pub(crate) const MOTION: &[Signal] = &[
     signal("request", 1, Kind::Selector(MotionRequest::NAMES), one!("")),
     when(4, "joint_target", 2, COORDINATE, JOINTS),
     when(4, "joint_speed", 18, FRACTION, one!("")),
+    when(4, "joint_zone", 22, ZONE, one!("m")),
     when(5, "line_target", 2, COORDINATE, POSE),
     when(5, "line_speed", 18, FRACTION, one!("")),
     when(5, "line_elbow", 22, ELBOW, one!("")),
     when(5, "line_turn", 23, TURN, one!("")),
     when(5, "line_tool_speed", 24, TOOL_SPEED, one!("m/s")),
+    when(5, "line_zone", 28, ZONE, one!("m")),
     when(6, "jump_target", 2, COORDINATE, POSE),
     when(6, "jump_top", 18, COORDINATE, one!("m")),
     when(6, "jump_clearance", 22, range(0.0, 1.0), one!("m")),
     when(6, "jump_speed", 26, FRACTION, one!("")),
     when(6, "jump_elbow", 30, ELBOW, one!("")),
     when(6, "jump_turn", 31, TURN, one!("")),
+    when(6, "jump_zone", 32, ZONE, one!("m")),
     when(7, "payload_mass", 2, range(0.0, 100.0), one!("kg")),
     when(7, "payload_com", 6, range(-1.0, 1.0), POINT),
     when(
@@ -163,6 +168,7 @@ pub(crate) const MOTION: &[Signal] = &[
     when(13, "arc_elbow", 34, ELBOW, one!("")),
     when(13, "arc_turn", 35, TURN, one!("")),
     when(13, "arc_tool_speed", 36, TOOL_SPEED, one!("m/s")),
+    when(13, "arc_zone", 40, ZONE, one!("m")),
 ];
 
 /// Report of the controller.

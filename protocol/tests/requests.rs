@@ -39,6 +39,7 @@ fn a_pose_is_asked_for_with_a_posture() {
         speed,
         posture,
         tool_speed: 0.0,
+        zone: 0.0,
     };
     let arc = MotionRequest::MoveArc {
         target,
@@ -46,6 +47,7 @@ fn a_pose_is_asked_for_with_a_posture() {
         speed,
         posture,
         tool_speed: 0.0,
+        zone: 0.0,
     };
     let jump = MotionRequest::Jump {
         target,
@@ -53,8 +55,13 @@ fn a_pose_is_asked_for_with_a_posture() {
         clearance: 0.0,
         speed,
         posture,
+        zone: 0.0,
     };
-    let joint = MotionRequest::MoveJoint { target, speed };
+    let joint = MotionRequest::MoveJoint {
+        target,
+        speed,
+        zone: 0.0,
+    };
     let found = [line, arc, jump, joint].map(|request| request.posture());
     assert_eq!(found, [Some(posture), Some(posture), Some(posture), None]);
 }

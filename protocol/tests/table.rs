@@ -94,16 +94,22 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                 MotionRequest::Disable => vec![one("request", 1)],
                 MotionRequest::FaultReset => vec![one("request", 2)],
                 MotionRequest::Stop => vec![one("request", 3)],
-                MotionRequest::MoveJoint { target, speed } => vec![
+                MotionRequest::MoveJoint {
+                    target,
+                    speed,
+                    zone,
+                } => vec![
                     one("request", 4),
                     many("joint_target", target),
                     one("joint_speed", speed),
+                    one("joint_zone", zone),
                 ],
                 MotionRequest::MoveLine {
                     target,
                     speed,
                     posture,
                     tool_speed,
+                    zone,
                 } => vec![
                     one("request", 5),
                     many("line_target", target),
@@ -111,6 +117,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                     one("line_elbow", posture.elbow.code()),
                     one("line_turn", posture.turn.code()),
                     one("line_tool_speed", tool_speed),
+                    one("line_zone", zone),
                 ],
                 MotionRequest::MoveArc {
                     target,
@@ -118,6 +125,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                     speed,
                     posture,
                     tool_speed,
+                    zone,
                 } => vec![
                     one("request", 13),
                     many("arc_target", target),
@@ -126,6 +134,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                     one("arc_elbow", posture.elbow.code()),
                     one("arc_turn", posture.turn.code()),
                     one("arc_tool_speed", tool_speed),
+                    one("arc_zone", zone),
                 ],
                 MotionRequest::Jump {
                     target,
@@ -133,6 +142,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                     clearance,
                     speed,
                     posture,
+                    zone,
                 } => vec![
                     one("request", 6),
                     many("jump_target", target),
@@ -141,6 +151,7 @@ fn by_struct(message: &Message) -> Vec<(&'static str, Vec<f64>)> {
                     one("jump_speed", speed),
                     one("jump_elbow", posture.elbow.code()),
                     one("jump_turn", posture.turn.code()),
+                    one("jump_zone", zone),
                 ],
                 MotionRequest::SetPayload { mass, com, inertia } => vec![
                     one("request", 7),
@@ -358,6 +369,7 @@ fn the_hash_sees_every_part_of_the_table() {
                 Some(_) => None,
             };
         });
+        let range = |min, max| Kind::F32 { min, max };
         for s in 0..signals.len() {
             let mut with_signal = |change: &dyn Fn(&mut Signal)| {
                 let mut signals = signals.to_vec();
@@ -369,24 +381,9 @@ fn the_hash_sees_every_part_of_the_table() {
             with_signal(&|signal| signal.offset += 1);
             with_signal(&|signal| signal.elements = &[("", "furlong")]);
             with_signal(&|signal| signal.when = Some(99));
-            with_signal(&|signal| {
-                signal.kind = Kind::F32 {
-                    min: -1.5,
-                    max: 1.5,
-                }
-            });
-            with_signal(&|signal| {
-                signal.kind = Kind::F32 {
-                    min: -1.5,
-                    max: 2.5,
-                }
-            });
-            with_signal(&|signal| {
-                signal.kind = Kind::F32 {
-                    min: -2.5,
-                    max: 1.5,
-                }
-            });
+            with_signal(&|signal| signal.kind = range(-1.5, 1.5));
+            with_signal(&|signal| signal.kind = range(-1.5, 2.5));
+            with_signal(&|signal| signal.kind = range(-2.5, 1.5));
             with_signal(&|signal| signal.kind = Kind::Code(&[(0, "other")]));
             with_signal(&|signal| signal.kind = Kind::Code(&[(1, "other")]));
             with_signal(&|signal| signal.kind = Kind::Flags8(&["other"]));

@@ -50,11 +50,16 @@ fn jump(to: [f64; 4], top: f64) -> Step {
         top,
         clearance: 0.0,
         speed: 1.0,
+        zone: 0.0,
     })
 }
 
 fn joints(to: [f64; 4]) -> Step {
-    Step::Joints(Joints { to, speed: 1.0 })
+    Step::Joints(Joints {
+        to,
+        speed: 1.0,
+        zone: 0.0,
+    })
 }
 
 /// Runs without a fault; the error of the tool stays below `limit_mm`, and no motor is at its limit for longer than the

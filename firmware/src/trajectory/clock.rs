@@ -40,6 +40,20 @@ impl Clock {
         }
     }
 
+    /// Goes on with a trajectory that began `begun` s after this one.
+    pub fn go_over(&mut self, begun: f32, period: f32) {
+        let samples = begun / period;
+        let whole = samples as u32;
+        self.ticks = self.ticks.saturating_sub(whole);
+        self.fraction -= samples - whole as f32;
+        if self.fraction < 0.0 && self.ticks > 0 {
+            self.ticks -= 1;
+            self.fraction += 1.0;
+        }
+        // Below 0 it would not have begun.
+        self.fraction = greatest(self.fraction, 0.0);
+    }
+
     /// Where the time scale is to go from now on, 0 to 1.
     pub fn set_pace(&mut self, pace: f32) {
         self.pace = pace;

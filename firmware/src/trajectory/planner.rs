@@ -19,6 +19,7 @@
 //! trajectories*, 1984).
 
 mod balance;
+mod blend;
 mod cruise;
 mod jump;
 mod survey;
@@ -34,8 +35,9 @@ use super::request::{Request, Target, from_path};
 use super::torque_budget::TorqueBudget;
 use super::{Reference, Trajectory};
 use crate::mechanics::arm::ArmModel;
+use blend::Blend;
 use jump::{Chamfer, Jump};
-use survey::Apex;
+use survey::{Apex, fill};
 use verify::Before;
 
 /// Corrections of the accelerations.
@@ -60,6 +62,8 @@ const NO_PATH: Path = Path::Joint {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Idle,
+    /// Passage between two planned moves.
+    Blend(Blend),
     /// Joint positions of the target.
     Aim {
         target: Target,
@@ -143,8 +147,6 @@ pub struct Planner {
     draft: Trajectory,
     bounds: Bounds,
     speed: f32,
-    /// Greatest speed of the flange along a curve, m/s; 0 for any.
-    tool_speed: f32,
     /// Where the request is a jump.
     jump: Option<Jump>,
     /// Of an arc: where the arm is most nearly stretched, as a share of the way; in the last pass, when, s. Torques peak there within a
@@ -179,6 +181,9 @@ impl Planner {
                 span: 0.0,
                 time_scale: 1.0,
                 end: Vector4::zeros(),
+                zone: 0.0,
+                overlap: 0.0,
+                tool_speed: 0.0,
                 sequence: 0,
             },
             bounds: Bounds {
@@ -188,7 +193,6 @@ impl Planner {
                 brake: HalfBounds::even(1.0, 1.0),
             },
             speed: 1.0,
-            tool_speed: 0.0,
             jump: None,
             apex: 0.0,
             slow_tool: false,
@@ -202,7 +206,7 @@ impl Planner {
 
     /// Drops the current request and returns its number.
     pub fn cancel(&mut self) -> Option<u8> {
-        let planning = !self.is_idle();
+        let planning = !self.is_idle() && !self.is_blending();
         self.stage = Stage::Idle;
         planning.then_some(self.draft.sequence)
     }
@@ -221,7 +225,8 @@ impl Planner {
     /// Takes a request for a move from the joint positions `from`.
     pub fn begin(&mut self, request: &Request, from: &Vector4<f32>) {
         self.speed = request.speed;
-        self.tool_speed = request.tool_speed;
+        self.draft.tool_speed = request.tool_speed;
+        self.draft.zone = request.zone;
         self.draft.sequence = request.sequence;
         self.draft.end = *from;
         self.stage = Stage::Aim {
@@ -233,7 +238,7 @@ impl Planner {
     /// means that [`Planner::trajectory`] holds the requested trajectory, and `Err` why there is none.
     pub fn work(&mut self, budget: &TorqueBudget<'_>) -> Option<Result<(), Refusal>> {
         let step = match self.stage {
-            Stage::Idle => return None,
+            Stage::Idle | Stage::Blend(_) => return None,
             Stage::Aim { target } => self.aim(budget.arm, target),
             Stage::Locate { target, end } => self.locate(budget.arm, &target, &end),
             Stage::Survey {
@@ -305,7 +310,7 @@ impl Planner {
         if !(self.speed > 0.0 && self.speed <= 1.0) {
             return Err(Refusal::value(RefusalReason::OutOfRange, self.speed, 1.0));
         }
-        let tool_speed = self.tool_speed;
+        let tool_speed = self.draft.tool_speed;
         if tool_speed.is_nan() || tool_speed != 0.0 && tool_speed < LEAST_TOOL_SPEED {
             let limit = LEAST_TOOL_SPEED;
             return Err(Refusal::value(RefusalReason::OutOfRange, tool_speed, limit));
@@ -386,15 +391,4 @@ impl Default for Planner {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// The speed along the path at which the first joint reaches its limit, given the joints' travel per unit of path; huge
-/// where nothing moves.
-fn fill(limit: &Vector4<f32>, travel: &Vector4<f32>) -> f32 {
-    limit
-        .iter()
-        .zip(travel.iter())
-        .filter(|(_, travel)| travel.abs() > NO_TRAVEL)
-        .map(|(limit, travel)| limit / travel.abs())
-        .fold(f32::MAX, f32::min)
 }

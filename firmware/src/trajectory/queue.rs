@@ -50,6 +50,8 @@ pub struct MoveQueue {
     moves: Deque<Trajectory, CAPACITY>,
     /// Runs along the first of `moves`.
     clock: Clock,
+    /// Time on it at the last sample, s.
+    now: f32,
     /// Pace that the operator has asked for.
     asked: f32,
     /// Pace at which the torque was found to suffice.
@@ -71,6 +73,7 @@ impl MoveQueue {
             planner: Planner::new(),
             moves: Deque::new(),
             clock: Clock::new(1.0),
+            now: 0.0,
             asked: 1.0,
             found: 1.0,
             cool: 1.0,
@@ -93,6 +96,11 @@ impl MoveQueue {
 
     /// Whether a move is being planned.
     pub fn is_planning(&self) -> bool {
+        !self.planner.is_idle() && !self.planner.is_blending()
+    }
+
+    /// Whether a move is being planned, or the passage between two, which makes a sample expensive.
+    pub fn is_busy(&self) -> bool {
         !self.planner.is_idle()
     }
 
@@ -172,6 +180,12 @@ impl MoveQueue {
         self.is_ready() && !self.clock.is_even()
     }
 
+    /// Whether two moves are under way, which makes a sample expensive.
+    pub fn is_blending(&self) -> bool {
+        let first = self.moves.front();
+        first.is_some_and(|first| first.overlap > 0.0 && self.now > first.next_begins())
+    }
+
     /// Takes a request.
     ///
     /// # Errors
@@ -192,17 +206,25 @@ impl MoveQueue {
     /// Drops all planned moves; the next one starts at `q`.
     pub fn clear(&mut self, q: &Vector4<f32>) {
         self.moves.clear();
+        if self.planner.is_blending() {
+            self.planner.cancel();
+        }
         self.clock = Clock::new(self.pace());
+        self.now = 0.0;
         self.plan_end = *q;
     }
 
     /// Whether there is a move to plan and room for it.
     pub fn has_to_plan(&self) -> bool {
-        self.is_planning() || !(self.requests.is_empty() || self.moves.is_full())
+        self.is_busy() || !(self.requests.is_empty() || self.moves.is_full())
     }
 
     /// One step of planning. Returns the number of a request and its answer once there is one.
     pub fn plan(&mut self, budget: &TorqueBudget<'_>) -> Option<(u8, Result<(), Refusal>)> {
+        if self.planner.is_blending() {
+            self.find_overlap(budget);
+            return None;
+        }
         if self.planner.is_idle() {
             if self.moves.is_full() {
                 return None;
@@ -213,15 +235,31 @@ impl MoveQueue {
         }
         let planned = self.planner.work(budget)?;
         let sequence = self.planner.sequence();
-        Some((
-            sequence,
-            planned.map(|()| {
-                let trajectory = self.planner.trajectory();
-                self.plan_end = trajectory.end;
-                // Room was checked when the planner took the request.
-                let _ = self.moves.push_back(*trajectory);
-            }),
-        ))
+        let planned = planned.map(|()| {
+            let trajectory = *self.planner.trajectory();
+            self.plan_end = trajectory.end;
+            if let Some(first) = self.moves.back() {
+                self.planner.begin_blend(first, &trajectory);
+            }
+            // Room was checked when the planner took the request.
+            let _ = self.moves.push_back(trajectory);
+        });
+        Some((sequence, planned))
+    }
+
+    /// One step towards the overlap of the last two moves. Found too late, or with the first one ended, the arm stops between them.
+    fn find_overlap(&mut self, budget: &TorqueBudget<'_>) {
+        let mut last = self.moves.iter_mut().rev();
+        let (Some(next), Some(first)) = (last.next(), last.next()) else {
+            self.planner.cancel();
+            return;
+        };
+        if let Some(overlap) = self.planner.overlap(budget, first, next) {
+            let waits = last.next().is_some();
+            if waits || self.now < first.duration() - overlap {
+                first.overlap = overlap;
+            }
+        }
     }
 
     /// What to follow next, in place of what was followed last. Without a move the arm stays there.
@@ -247,12 +285,21 @@ impl MoveQueue {
         }
         let mut t = self.clock.time(period);
         let mut duration = trajectory.duration();
-        if t >= duration && !stopping && self.moves.len() > 1 {
+        let mut stops = stopping;
+        while t >= duration && self.moves.len() > 1 && (trajectory.overlap > 0.0 || !stops) {
             // The next move begins where and when this one ends, within the sample. What the last sample looked ahead to was the end.
-            t -= duration;
+            let begun = trajectory.next_begins();
+            t -= begun;
             self.completed = trajectory.sequence;
+            if trajectory.overlap > 0.0 {
+                // Or it is under way, and its clock runs.
+                self.clock.go_over(begun, period);
+                self.clock.set_pace(self.pace());
+            } else {
+                self.clock = Clock::begun(self.pace(), t / period);
+                stops = true;
+            }
             self.moves.pop_front();
-            self.clock = Clock::begun(self.pace(), t / period);
             let Some(next) = self.moves.front() else {
                 *setpoint = Setpoint::rest(here);
                 return Progress::Arrived;
@@ -261,8 +308,18 @@ impl MoveQueue {
             duration = next.duration();
         }
         let (sequence, ended) = (trajectory.sequence, t >= duration);
+        self.now = t;
         let ahead = self.clock.lead(lead);
-        if trajectory.follow(budget.arm, t, ahead, setpoint).is_err() {
+        let mut followed = trajectory.follow(budget.arm, t, ahead, setpoint);
+        let since = t - trajectory.next_begins();
+        if trajectory.overlap > 0.0
+            && since + ahead > 0.0
+            && let Some(next) = self.moves.get(1)
+        {
+            followed =
+                followed.and_then(|()| trajectory.add(next, budget.arm, since, ahead, setpoint));
+        }
+        if followed.is_err() {
             // A verified path stays in reach; should arithmetic disagree, the arm holds.
             *setpoint = Setpoint::rest(here);
         }
@@ -286,6 +343,7 @@ impl MoveQueue {
             self.completed = sequence;
             self.moves.pop_front();
             self.clock = Clock::new(self.pace());
+            self.now = 0.0;
         }
         if self.moves.is_empty() {
             Progress::Arrived

@@ -43,6 +43,9 @@ pub struct Request {
     pub speed: f32,
     /// Greatest speed of the flange along a line or an arc, m/s; 0 for as fast as the arm can.
     pub tool_speed: f32,
+    /// How far from its end the arm may leave the path for that of the next move, m: it passes there without a stop, if the next one is planned
+    /// by then. 0 to stop at the end.
+    pub zone: f32,
 }
 
 /// Height that counts as none, m.

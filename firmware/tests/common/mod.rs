@@ -4,6 +4,7 @@
 pub(crate) mod draws;
 pub(crate) mod magnitude;
 pub(crate) mod planned;
+pub(crate) mod queued;
 
 use firmware::mechanics::arm::{ArmModel, Geometry, IRB_930, Link, Payload};
 use nalgebra::{Vector3, Vector4};

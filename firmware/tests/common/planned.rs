@@ -4,10 +4,10 @@
 use firmware::mechanics::arm::{ArmModel, IRB_930, Payload};
 use firmware::mechanics::body::Body;
 use firmware::mechanics::dynamics::newton_euler;
-use firmware::trajectory::Trajectory;
 use firmware::trajectory::planner::Planner;
 use firmware::trajectory::request::{Request, Target};
 use firmware::trajectory::torque_budget::TorqueBudget;
+use firmware::trajectory::{Reference, Trajectory};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 use protocol::messages::Refusal;
@@ -48,6 +48,7 @@ pub(crate) fn plan_with(
             target,
             speed,
             tool_speed,
+            zone: 0.0,
         },
         from,
     );
@@ -68,16 +69,32 @@ pub(crate) fn check(
     payload: &Payload,
     trajectory: &Trajectory,
 ) -> Result<(), TestCaseError> {
-    let body = Body::new(arm, payload);
     let duration = trajectory.duration();
     let steps = 800;
+    let walk = (0..=steps).map(|i| {
+        let t = duration * i as f32 / steps as f32;
+        trajectory
+            .at(arm, t)
+            .expect("a planned path stays in reach")
+    });
+    check_walk(arm, payload, duration / steps as f32, walk)?;
+    let end = trajectory.at(arm, duration * 1.01).expect("in reach");
+    prop_assert!((end.q - trajectory.end).amax() < 1e-5);
+    prop_assert_eq!(end.qd, Vector4::zeros());
+    Ok(())
+}
+
+/// Checks a motion, `h` seconds from sample to sample, against every limit.
+pub(crate) fn check_walk(
+    arm: &ArmModel,
+    payload: &Payload,
+    h: f32,
+    walk: impl Iterator<Item = Reference>,
+) -> Result<(), TestCaseError> {
+    let body = Body::new(arm, payload);
     let slack = 1.0 + 1e-3;
     let mut previous: Option<(Vector4<f32>, Vector4<f32>, Vector4<f32>)> = None;
-    for i in 0..=steps {
-        let t = duration * i as f32 / steps as f32;
-        let r = trajectory
-            .at(arm, t)
-            .expect("a planned path stays in reach");
+    for (i, r) in walk.enumerate() {
         // Dry friction is there at once: the rate of a torque is that of the rest.
         let smooth = newton_euler::inverse(arm, payload, &r.q, &r.qd, &r.qdd)
             + body.drive.rotor_inertia() * r.qdd
@@ -114,7 +131,6 @@ pub(crate) fn check(
         }
         // Positions, speeds and accelerations are consistent: no jump between two samples.
         if let Some((before, acceleration, earlier)) = previous {
-            let h = duration / steps as f32;
             for axis in 0..4 {
                 let bound = arm.limits.velocity[axis] * h * slack + 1e-5;
                 prop_assert!((r.q[axis] - before[axis]).abs() <= bound);
@@ -139,15 +155,13 @@ pub(crate) fn check(
                 );
                 prop_assert!(
                     joint.max(motor) <= 1.0 + noise,
-                    "torque rate {axis} {joint} {motor} at {t} of {duration}"
+                    "torque rate {axis} {joint} {motor} at {}",
+                    i as f32 * h
                 );
             }
         }
         previous = Some((r.q, r.qdd, smooth));
     }
-    let end = trajectory.at(arm, duration * 1.01).expect("in reach");
-    prop_assert!((end.q - trajectory.end).amax() < 1e-5);
-    prop_assert_eq!(end.qd, Vector4::zeros());
     Ok(())
 }
 

@@ -149,7 +149,11 @@ impl Bench {
         bench.enable();
         bench.follows = true;
         let target = [-1.0, 0.5, 0.05, -2.0];
-        let frame = bench.motion(MotionRequest::MoveJoint { target, speed: 1.0 });
+        let frame = bench.motion(MotionRequest::MoveJoint {
+            target,
+            speed: 1.0,
+            zone: 0.0,
+        });
         bench.wire.to_node.push_back(frame);
         let fast = |bench: &Self| bench.node.controller().reference().qd.x < -3.0;
         for _ in 0..500 {

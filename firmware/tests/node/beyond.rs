@@ -36,11 +36,13 @@ fn manual_operation_frees_an_arm_from_beyond_a_limit() {
         let further = MotionRequest::MoveJoint {
             target: at(2.7),
             speed: 1.0,
+            zone: 0.0,
         };
         assert_eq!(bench.refusal(further), RefusalReason::JointLimit);
         let aside = MotionRequest::MoveJoint {
             target: [0.1, side * 2.6, 0.15, 0.3],
             speed: 1.0,
+            zone: 0.0,
         };
         assert_eq!(bench.refusal(aside), RefusalReason::JointLimit);
         go(&mut bench, at(2.4));

@@ -40,7 +40,11 @@ fn samples_that_nobody_has_counted_are_caught_up() {
     bench.follows = true;
     let mut target: [f32; 4] = here(&bench).into();
     target[0] -= 2.0;
-    let turn = MotionRequest::MoveJoint { target, speed: 0.3 };
+    let turn = MotionRequest::MoveJoint {
+        target,
+        speed: 0.3,
+        zone: 0.0,
+    };
     assert_eq!(bench.request(turn), Some(Outcome::Accepted));
     for _ in 0..1000 {
         if bench.node.controller().reference().qdd.x == 0.0 {

@@ -52,7 +52,11 @@ pub(crate) fn hold(bench: &mut Bench, samples: usize) -> Vec<Message> {
 }
 
 pub(crate) fn go(bench: &mut Bench, target: [f32; 4]) {
-    let to = MotionRequest::MoveJoint { target, speed: 1.0 };
+    let to = MotionRequest::MoveJoint {
+        target,
+        speed: 1.0,
+        zone: 0.0,
+    };
     assert_eq!(bench.request(to), Some(Outcome::Accepted));
 }
 
@@ -132,6 +136,7 @@ fn no_point_of_the_tool_is_planned_faster_than_nine_tenths_of_the_limit() {
         speed: 1.0,
         posture,
         tool_speed: 0.0,
+        zone: 0.0,
     };
     let jump = |target| MotionRequest::Jump {
         target,
@@ -139,8 +144,13 @@ fn no_point_of_the_tool_is_planned_faster_than_nine_tenths_of_the_limit() {
         clearance: 0.0,
         speed: 1.0,
         posture,
+        zone: 0.0,
     };
-    let joint = |target| MotionRequest::MoveJoint { target, speed: 1.0 };
+    let joint = |target| MotionRequest::MoveJoint {
+        target,
+        speed: 1.0,
+        zone: 0.0,
+    };
     for (name, requests) in [
         (
             "joints",

@@ -93,7 +93,11 @@ impl Pair {
                     -1.0
                 };
                 let target = [-side, 0.5 * side, 0.1 + 0.05 * side, 2.0 * side];
-                let frame = bench.motion(MotionRequest::MoveJoint { target, speed: 1.0 });
+                let frame = bench.motion(MotionRequest::MoveJoint {
+                    target,
+                    speed: 1.0,
+                    zone: 0.0,
+                });
                 bench.node.poll(bench.now, Some(&frame), &mut bench.wire);
             }
             bench.now += PERIOD.duration();

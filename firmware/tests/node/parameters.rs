@@ -26,7 +26,6 @@ pub(crate) struct Client {
 
 impl Deref for Client {
     type Target = Bench;
-
     fn deref(&self) -> &Bench {
         &self.bench
     }
@@ -297,6 +296,7 @@ fn what_changes_torques_waits_until_the_arm_is_at_rest() {
     bench.ask(MotionRequest::MoveJoint {
         target: [0.5, 1.2, 0.1, 0.0],
         speed: 0.5,
+        zone: 0.0,
     });
     for parameter in [
         ControllerParameter::Bandwidth,

@@ -116,6 +116,7 @@ fn jump() -> MotionRequest {
         clearance: 0.01,
         speed: 1e-3,
         posture: Posture::NEAREST,
+        zone: 0.0,
     }
 }
 

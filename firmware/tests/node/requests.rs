@@ -14,7 +14,11 @@ use crate::bench::{Bench, PERIOD};
 #[test]
 fn requests_are_refused_where_they_make_no_sense() {
     let mut bench = Bench::enabled();
-    let move_to = |target| MotionRequest::MoveJoint { target, speed: 1.0 };
+    let move_to = |target| MotionRequest::MoveJoint {
+        target,
+        speed: 1.0,
+        zone: 0.0,
+    };
     assert_eq!(
         bench.refusal(MotionRequest::Enable),
         RefusalReason::WrongState

@@ -60,7 +60,11 @@ fn an_axis_that_stands_slows_down_no_move_under_way() {
         // From where it is to the last bit, so that the others stand.
         let mut target: [f32; 4] = here(&bench).into();
         target[3] = 3.0;
-        let wrist = MotionRequest::MoveJoint { target, speed: 0.2 };
+        let wrist = MotionRequest::MoveJoint {
+            target,
+            speed: 0.2,
+            zone: 0.0,
+        };
         assert_eq!(bench.request(wrist), Some(Outcome::Accepted));
         assert_eq!(bench.mode(), Mode::Moving);
         let limit = IRB_930.drive.motor_torque_limit.x;

@@ -25,7 +25,7 @@ const FLIPS: u32 = 2 * ones_and_twos(48) + threes(16) + threes(5);
 const RANDOM_CLASSICAL: u32 = 3 << 15;
 const RANDOM_FD: u32 = 9 << 15;
 /// Floats of the table, 400 of them NaN and two infinite; twice two out of range where the range ends before the floats do.
-const FLOATS: u32 = 25_912;
+const FLOATS: u32 = 27_536;
 /// 0 to 128 behind the newest counter, 256 times, of feedback and of requests.
 const COUNTERS: u32 = 256 * 129 * 2;
 

@@ -174,6 +174,7 @@ mod tests {
                 elbow: ElbowSide::Keep,
                 turn: WristTurn::MinusOne,
             },
+            zone: 0.0,
         };
         let refusal = Refusal {
             reason,

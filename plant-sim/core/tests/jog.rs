@@ -71,7 +71,11 @@ fn an_axis_moves_as_long_as_its_button_is_held() {
     let shoulder = |seen: &Record| seen.truths.last().unwrap().plant.q[0];
     let mut target = seen.truths.last().unwrap().plant.q.map(|q| q as f32);
     target[0] = 2.6;
-    let jog = Order::Jog(MotionRequest::MoveJoint { target, speed: 1.0 });
+    let jog = Order::Jog(MotionRequest::MoveJoint {
+        target,
+        speed: 1.0,
+        zone: 0.0,
+    });
     let hold = |run: &mut Live<'_>, seen: &mut Record, seconds: f64| {
         for _ in 0..(seconds / 0.05) as u32 {
             run.order(Order::Request(MotionRequest::Hold));

@@ -168,6 +168,7 @@ fn what_is_asked_for_goes_over_the_bus_and_is_done() {
         speed: 0.5,
         posture: Posture::NEAREST,
         tool_speed: 0.0,
+        zone: 0.0,
     };
     run.order(Order::Request(line));
     let answers = live(&mut run, &mut seen, 3.0);
@@ -318,12 +319,18 @@ fn orders() -> impl Strategy<Value = Order> {
                 target,
                 speed,
                 posture,
-                tool_speed: 0.0
+                tool_speed: 0.0,
+                zone: 0.0
             }
         )),
         (0.0_f32..1.2).prop_map(|pace| Order::Request(MotionRequest::SetOverride { pace })),
-        (target, -0.1_f32..1.2)
-            .prop_map(|(target, speed)| Order::Request(MotionRequest::MoveJoint { target, speed })),
+        (target, -0.1_f32..1.2).prop_map(|(target, speed)| Order::Request(
+            MotionRequest::MoveJoint {
+                target,
+                speed,
+                zone: 0.0
+            }
+        )),
     ]
 }
 

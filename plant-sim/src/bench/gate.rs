@@ -143,6 +143,7 @@ impl Case {
                 top: Z + RISE,
                 clearance: 0.0,
                 speed: 1.0,
+                zone: 0.0,
             })
         };
         let Gate {

@@ -36,6 +36,7 @@ pub(super) enum Asked {
         top: f64,
         clearance: f64,
         speed: f64,
+        zone: f64,
     },
     Line {
         x: f64,
@@ -44,6 +45,7 @@ pub(super) enum Asked {
         yaw: f64,
         speed: f64,
         tool_speed: f64,
+        zone: f64,
     },
     Arc {
         via_x: f64,
@@ -55,6 +57,7 @@ pub(super) enum Asked {
         yaw: f64,
         speed: f64,
         tool_speed: f64,
+        zone: f64,
     },
     /// A small move of one axis from where it stands.
     Jog {
@@ -131,12 +134,14 @@ impl Asked {
                 top,
                 clearance,
                 speed,
+                zone,
             } => request(MotionRequest::Jump {
                 target: pose([x, y, z, yaw]),
                 top: metres(top),
                 clearance: metres(clearance),
                 speed: share(speed),
                 posture: Posture::NEAREST,
+                zone: metres(zone),
             }),
             &Self::Line {
                 x,
@@ -145,11 +150,13 @@ impl Asked {
                 yaw,
                 speed,
                 tool_speed,
+                zone,
             } => request(MotionRequest::MoveLine {
                 target: pose([x, y, z, yaw]),
                 speed: share(speed),
                 posture: Posture::NEAREST,
                 tool_speed: metres(tool_speed),
+                zone: metres(zone),
             }),
             &Self::Arc {
                 via_x,
@@ -161,12 +168,14 @@ impl Asked {
                 yaw,
                 speed,
                 tool_speed,
+                zone,
             } => request(MotionRequest::MoveArc {
                 target: pose([x, y, z, yaw]),
                 via: [via_x, via_y, via_z].map(metres),
                 speed: share(speed),
                 posture: Posture::NEAREST,
                 tool_speed: metres(tool_speed),
+                zone: metres(zone),
             }),
             Self::Hold {} => request(MotionRequest::Hold),
             Self::Operation { operation } => {
@@ -241,6 +250,7 @@ impl Asked {
         let request = MotionRequest::MoveJoint {
             target,
             speed: share(*speed),
+            zone: 0.0,
         };
         let order = match self {
             Self::Push { .. } => Order::Jog(request),

@@ -34,6 +34,8 @@ pub enum MotionRequest {
         target: [f32; 4],
         /// Fraction of the joint limits, 0 to 1.
         speed: f32,
+        /// How far from the end the arm may leave the path for that of the next move, without a stop, m; 0 to stop there.
+        zone: f32,
     },
     /// Straight line of the tool.
     MoveLine {
@@ -45,6 +47,8 @@ pub enum MotionRequest {
         posture: Posture,
         /// Greatest speed of the flange, m/s; 0 for as fast as the arm can.
         tool_speed: f32,
+        /// How far from the end the arm may leave the path for that of the next move, without a stop, m; 0 to stop there.
+        zone: f32,
     },
     /// Up, across and down (gate motion).
     Jump {
@@ -58,6 +62,8 @@ pub enum MotionRequest {
         speed: f32,
         /// Which joint positions at the end.
         posture: Posture,
+        /// How far from the end the arm may leave the path for that of the next move, without a stop, m; 0 to stop there.
+        zone: f32,
     },
     /// Payload at the flange from now on.
     SetPayload {
@@ -109,6 +115,8 @@ pub enum MotionRequest {
         posture: Posture,
         /// Greatest speed of the flange, m/s; 0 for as fast as the arm can.
         tool_speed: f32,
+        /// How far from the end the arm may leave the path for that of the next move, without a stop, m; 0 to stop there.
+        zone: f32,
     },
 }
 

@@ -93,42 +93,58 @@ pub(crate) fn request() -> impl Strategy<Value = MotionRequest> {
     use MotionRequest as R;
     prop_oneof![
         select(&[R::Enable, R::Disable, R::FaultReset, R::Stop][..]),
-        (coordinates(), fraction()).prop_map(|(target, speed)| R::MoveJoint { target, speed }),
-        (coordinates(), fraction(), posture(), tool_speed()).prop_map(
-            |(target, speed, posture, tool_speed)| R::MoveLine {
+        (coordinates(), fraction(), fraction()).prop_map(|(target, speed, zone)| R::MoveJoint {
+            target,
+            speed,
+            zone
+        }),
+        (
+            coordinates(),
+            fraction(),
+            posture(),
+            tool_speed(),
+            fraction()
+        )
+            .prop_map(|(target, speed, posture, tool_speed, zone)| R::MoveLine {
                 target,
                 speed,
                 posture,
-                tool_speed
-            }
-        ),
+                tool_speed,
+                zone
+            }),
         (
             coordinates(),
             uniform3(-100.0..=100.0f32),
             fraction(),
             posture(),
-            tool_speed()
+            tool_speed(),
+            fraction()
         )
-            .prop_map(|(target, via, speed, posture, tool_speed)| R::MoveArc {
-                target,
-                via,
-                speed,
-                posture,
-                tool_speed
-            }),
+            .prop_map(
+                |(target, via, speed, posture, tool_speed, zone)| R::MoveArc {
+                    target,
+                    via,
+                    speed,
+                    posture,
+                    tool_speed,
+                    zone
+                }
+            ),
         (
             coordinates(),
             -100.0..=100.0f32,
             fraction(),
             fraction(),
-            posture()
+            posture(),
+            fraction()
         )
-            .prop_map(|(target, top, clearance, speed, posture)| R::Jump {
+            .prop_map(|(target, top, clearance, speed, posture, zone)| R::Jump {
                 target,
                 top,
                 clearance,
                 speed,
-                posture
+                posture,
+                zone
             }),
         (
             0.0..=100.0f32,

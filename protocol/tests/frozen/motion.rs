@@ -62,6 +62,7 @@ fn move_joint() {
             request: MotionRequest::MoveJoint {
                 target: [0.5, -1.0, 0.25, 2.0],
                 speed: 1.0,
+                zone: 0.0,
             },
         }),
         5,
@@ -80,6 +81,7 @@ fn move_line() {
                 speed: 0.5,
                 posture: Posture::NEAREST,
                 tool_speed: 0.0,
+                zone: 0.0,
             },
         }),
         5,
@@ -99,6 +101,7 @@ fn jump() {
                 clearance: 0.0625,
                 speed: 1.0,
                 posture: Posture::NEAREST,
+                zone: 0.0,
             },
         }),
         5,
@@ -183,6 +186,7 @@ fn move_line_with_a_posture() {
                     turn: WristTurn::MinusOne,
                 },
                 tool_speed: 0.0,
+                zone: 0.0,
             },
         }),
         5,
@@ -205,6 +209,7 @@ fn jump_with_a_posture() {
                     elbow: ElbowSide::Positive,
                     turn: WristTurn::PlusOne,
                 },
+                zone: 0.0,
             },
         }),
         5,
@@ -251,6 +256,7 @@ fn move_line_with_a_tool_speed() {
                 speed: 0.5,
                 posture: Posture::NEAREST,
                 tool_speed: 0.25,
+                zone: 0.0,
             },
         }),
         5,
@@ -273,10 +279,93 @@ fn move_arc() {
                     turn: WristTurn::MinusOne,
                 },
                 tool_speed: 0.25,
+                zone: 0.0,
             },
         }),
         5,
         "2C0##1090D0000003F000080BE0000003E000040400000403F0000003F000000BF0000003F02030000803E\
         0000000000054876",
+    );
+}
+
+#[test]
+fn move_joint_with_a_zone() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::MoveJoint {
+                target: [0.5, -0.25, 0.125, 3.0],
+                speed: 0.5,
+                zone: 0.03125,
+            },
+        }),
+        5,
+        "2C0##109040000003F000080BE0000003E000040400000003F0000003D0000000000000000000000000000000\
+        0000000055EA0",
+    );
+}
+
+#[test]
+fn move_line_with_a_zone() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::MoveLine {
+                target: [0.5, -0.25, 0.125, 3.0],
+                speed: 0.5,
+                posture: Posture::NEAREST,
+                tool_speed: 0.25,
+                zone: 0.03125,
+            },
+        }),
+        5,
+        "2C0##109050000003F000080BE0000003E000040400000003F00000000803E0000003D0000000000000000000\
+        000000005FB79",
+    );
+}
+
+#[test]
+fn jump_with_a_zone() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::Jump {
+                target: [0.75, 0.25, -0.25, -1.5],
+                top: -0.125,
+                clearance: 0.0625,
+                speed: 1.0,
+                posture: Posture {
+                    elbow: ElbowSide::Positive,
+                    turn: WristTurn::PlusOne,
+                },
+                zone: 0.03125,
+            },
+        }),
+        5,
+        "2C0##109060000403F0000803E000080BE0000C0BF000000BE0000803D0000803F01020000003D00000000000\
+        0000000054B6A",
+    );
+}
+
+#[test]
+fn move_arc_with_a_zone() {
+    check(
+        Message::Motion(Motion {
+            sequence: 9,
+            request: MotionRequest::MoveArc {
+                target: [0.5, -0.25, 0.125, 3.0],
+                via: [0.75, 0.5, -0.5],
+                speed: 0.5,
+                posture: Posture {
+                    elbow: ElbowSide::Negative,
+                    turn: WristTurn::MinusOne,
+                },
+                tool_speed: 0.25,
+                zone: 0.03125,
+            },
+        }),
+        5,
+        "2C0##1090D0000003F000080BE0000003E000040400000403F0000003F000000BF0000003F02030000803E000\
+        0003D0005CF82",
     );
 }

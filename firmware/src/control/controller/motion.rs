@@ -22,8 +22,8 @@ impl Controller {
     /// Continues planning: one step per millisecond of the sampling period, at least one. Kept out of the path from
     /// measurement to command, which it would delay. Returns whether there was anything to plan.
     pub fn plan(&mut self) -> bool {
-        // Where a stop will end is not known before; and a sample that changes the pace has no time to plan.
-        let busy = self.state.is_stopping() || self.queue.is_ramping();
+        // Where a stop will end is not known before; and a sample that changes the pace, or follows two moves, has no time to plan.
+        let busy = self.state.is_stopping() || self.queue.is_ramping() || self.queue.is_blending();
         if !self.state.is_powered() || busy || !self.queue.has_to_plan() {
             return false;
         }

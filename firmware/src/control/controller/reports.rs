@@ -91,9 +91,9 @@ impl Controller {
         self.queue.len()
     }
 
-    /// Whether a move is being planned, which makes a sample expensive.
+    /// Whether a move is being planned, or the passage between two, which makes a sample expensive.
     pub fn is_planning(&self) -> bool {
-        self.queue.is_planning()
+        self.queue.is_busy()
     }
 
     /// Share of its planned speed at which a move passes or would pass now.

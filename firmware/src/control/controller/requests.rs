@@ -44,20 +44,23 @@ impl Controller {
                 self.event(Event::Stop);
                 Answer::Now
             }
-            MotionRequest::MoveJoint { target, speed } => self.enqueue(
-                sequence,
-                Target::Joints(Vector4::from(*target)),
-                *speed,
-                0.0,
-            )?,
+            MotionRequest::MoveJoint {
+                target,
+                speed,
+                zone,
+            } => {
+                let target = Target::Joints(Vector4::from(*target));
+                self.enqueue(sequence, target, [*speed, 0.0, *zone])?
+            }
             MotionRequest::MoveLine {
                 target,
                 speed,
                 posture,
                 tool_speed,
+                zone,
             } => {
                 let target = Target::Line(pose(target), *posture);
-                self.enqueue(sequence, target, *speed, *tool_speed)?
+                self.enqueue(sequence, target, [*speed, *tool_speed, *zone])?
             }
             MotionRequest::MoveArc {
                 target,
@@ -65,9 +68,10 @@ impl Controller {
                 speed,
                 posture,
                 tool_speed,
+                zone,
             } => {
                 let target = Target::Arc((*via).into(), pose(target), *posture);
-                self.enqueue(sequence, target, *speed, *tool_speed)?
+                self.enqueue(sequence, target, [*speed, *tool_speed, *zone])?
             }
             MotionRequest::Jump {
                 target,
@@ -75,6 +79,7 @@ impl Controller {
                 clearance,
                 speed,
                 posture,
+                zone,
             } => {
                 let target = Target::Jump {
                     pose: pose(target),
@@ -82,7 +87,7 @@ impl Controller {
                     top: *top,
                     clearance: *clearance,
                 };
-                self.enqueue(sequence, target, *speed, 0.0)?
+                self.enqueue(sequence, target, [*speed, 0.0, *zone])?
             }
             MotionRequest::SetOverride { pace } => {
                 self.queue.set_pace(*pace);
@@ -170,8 +175,7 @@ impl Controller {
         &mut self,
         sequence: u8,
         target: Target,
-        speed: f32,
-        tool_speed: f32,
+        [speed, tool_speed, zone]: [f32; 3],
     ) -> Result<Answer, Refusal> {
         match self.state {
             // Planned on as soon as it is known where the stop has ended.
@@ -186,6 +190,7 @@ impl Controller {
             target,
             speed,
             tool_speed,
+            zone,
         };
         self.queue.push(request)?;
         Ok(Answer::WhenPlanned)

@@ -4,7 +4,7 @@ use nalgebra::Vector4;
 use protocol::messages::Refusal;
 
 use super::verify::share;
-use super::{Planner, ROUNDS, Stage, fill};
+use super::{NO_TRAVEL, Planner, ROUNDS, Stage};
 use crate::mechanics::math::{clamp, least};
 use crate::trajectory::path::{Path, PathPoint, check_limits};
 use crate::trajectory::profile::{Bounds, HalfBounds};
@@ -100,10 +100,10 @@ impl Planner {
             speed = speed.min(along(path, geometry, part * PLANNED));
         }
         if let Path::Tool { curve, .. } = &self.draft.path
-            && self.tool_speed > 0.0
+            && self.draft.tool_speed > 0.0
         {
             // The share of full speed slows the whole plan down, and must not do so twice.
-            speed = speed.min(self.tool_speed / (self.speed * curve.length()));
+            speed = speed.min(self.draft.tool_speed / (self.speed * curve.length()));
         }
         // Of a robot that has such limits.
         let limits = &budget.arm.limits;
@@ -134,7 +134,7 @@ impl Planner {
         let (acceleration, jerk) = budget.from_rest(&here);
         // As much as the last pass leaves.
         let mut jerk = share(&self.draft) * jerk;
-        if self.tool_speed > 0.0 {
+        if self.draft.tool_speed > 0.0 {
             jerk *= EVEN_SHARE;
         }
         let bounds = &mut self.bounds;
@@ -166,4 +166,15 @@ fn farthest(here: &PathPoint, s: f32, reach: f32) -> Vector4<f32> {
         }
     }
     farthest
+}
+
+/// The speed along the path at which the first joint reaches its limit, given the joints' travel per unit of path; huge
+/// where nothing moves.
+pub(super) fn fill(limit: &Vector4<f32>, travel: &Vector4<f32>) -> f32 {
+    limit
+        .iter()
+        .zip(travel.iter())
+        .filter(|(_, travel)| travel.abs() > NO_TRAVEL)
+        .map(|(limit, travel)| limit / travel.abs())
+        .fold(f32::MAX, f32::min)
 }

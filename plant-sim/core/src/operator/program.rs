@@ -169,12 +169,14 @@ impl Program {
                 clearance: jump.clearance as f32,
                 speed: jump.speed as f32,
                 posture: jump.posture(),
+                zone: jump.zone as f32,
             }),
             Step::Line(line) => request(MotionRequest::MoveLine {
                 target: line.to.map(|x| x as f32),
                 speed: line.speed as f32,
                 posture: line.posture(),
                 tool_speed: line.tool_speed(),
+                zone: line.zone as f32,
             }),
             Step::Arc(arc) => request(MotionRequest::MoveArc {
                 target: arc.to.map(|x| x as f32),
@@ -182,10 +184,12 @@ impl Program {
                 speed: arc.speed as f32,
                 posture: arc.posture(),
                 tool_speed: arc.tool_speed(),
+                zone: arc.zone as f32,
             }),
             Step::Joints(joints) => request(MotionRequest::MoveJoint {
                 target: joints.to.map(|x| x as f32),
                 speed: joints.speed as f32,
+                zone: joints.zone as f32,
             }),
             Step::Dwell(seconds) => vec![
                 Action::WaitArrived,

@@ -3,6 +3,7 @@
 mod operation;
 mod place;
 mod requirements;
+mod zone;
 
 use std::f64::consts::TAU;
 
@@ -33,6 +34,7 @@ pub(super) const POINT: Each<3> = Each([LENGTH; 3]);
 pub(super) const POSITIONS: Each<4> = Each([JOINT, JOINT, LENGTH, JOINT]);
 pub(super) const RATE: Allowed = Allowed::within(100.0, 10_000.0, "Hz");
 pub(super) const CLEARANCE: Allowed = Allowed::within(0.0, 1.0, "m");
+pub(super) const ZONE: Allowed = Allowed::within(0.0, 1.0, "m");
 /// At a ten-thousandth a move takes hours; slower ones are meant otherwise.
 const SLOWEST: f64 = 1e-4;
 pub(super) const SPEED: Allowed = Allowed::within(SLOWEST, 1.0, "of full speed");
@@ -82,6 +84,7 @@ impl Scenario {
         for (index, step) in self.cycle.iter().enumerate() {
             let key = format!("cycle[{index}]");
             findings.step(&key, step);
+            findings.zone(&key, step, self.cycle.get(index + 1));
             if let (Step::Stop(after), false) = (step, moves) {
                 findings.wrong(
                     &format!("{key}.stop"),
@@ -257,6 +260,7 @@ impl<'a> Findings<'a> {
                 top,
                 clearance,
                 speed,
+                zone: _,
             }) => {
                 self.pose(&format!("{key}.jump.to"), to);
                 self.turn(&format!("{key}.jump.turn"), *turn);
@@ -270,6 +274,7 @@ impl<'a> Findings<'a> {
                 turn,
                 speed,
                 tool_speed,
+                zone: _,
             }) => {
                 let key = format!("{key}.line");
                 self.pose(&format!("{key}.to"), to);
@@ -284,6 +289,7 @@ impl<'a> Findings<'a> {
                 turn,
                 speed,
                 tool_speed,
+                zone: _,
             }) => {
                 let key = format!("{key}.arc");
                 self.numbers(&format!("{key}.via"), via, POINT);
@@ -292,7 +298,7 @@ impl<'a> Findings<'a> {
                 self.number(&format!("{key}.speed"), *speed, SPEED);
                 self.tool_speed(&key, *tool_speed);
             }
-            Step::Joints(Joints { to, speed }) => {
+            Step::Joints(Joints { to, speed, zone: _ }) => {
                 self.numbers(&format!("{key}.joints.to"), to, POSITIONS);
                 self.number(&format!("{key}.joints.speed"), *speed, SPEED);
             }

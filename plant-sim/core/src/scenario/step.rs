@@ -46,6 +46,17 @@ impl Step {
         )
     }
 
+    /// Zone of a move, m; 0 of any other step.
+    pub(crate) fn zone(&self) -> f64 {
+        match self {
+            Self::Jump(Jump { zone, .. })
+            | Self::Line(Line { zone, .. })
+            | Self::Arc(Arc { zone, .. })
+            | Self::Joints(Joints { zone, .. }) => *zone,
+            _ => 0.0,
+        }
+    }
+
     /// Its key.
     pub(crate) fn name(&self) -> &'static str {
         match self {
@@ -108,6 +119,10 @@ pub struct Jump {
     #[serde(default = "full")]
     #[schemars(transform = by(check::SPEED))]
     pub speed: f64,
+    /// How far from the end the arm may leave its path for that of the next step, m, to pass there without a stop; 0 to stop at the end.
+    #[serde(default)]
+    #[schemars(transform = by(check::ZONE))]
+    pub zone: f64,
 }
 
 /// A straight line of the tool.
@@ -134,6 +149,10 @@ pub struct Line {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(transform = by(check::TOOL_SPEED))]
     pub tool_speed: Option<f64>,
+    /// How far from the end the arm may leave its path for that of the next step, m, to pass there without a stop; 0 to stop at the end.
+    #[serde(default)]
+    #[schemars(transform = by(check::ZONE))]
+    pub zone: f64,
 }
 
 /// An arc of the tool through three points: from where it is, through `via`, to the end. It is refused where they lie on one line.
@@ -164,6 +183,10 @@ pub struct Arc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(transform = by(check::TOOL_SPEED))]
     pub tool_speed: Option<f64>,
+    /// How far from the end the arm may leave its path for that of the next step, m, to pass there without a stop; 0 to stop at the end.
+    #[serde(default)]
+    #[schemars(transform = by(check::ZONE))]
+    pub zone: f64,
 }
 
 /// A move to joint positions.
@@ -178,6 +201,10 @@ pub struct Joints {
     #[serde(default = "full")]
     #[schemars(transform = by(check::SPEED))]
     pub speed: f64,
+    /// How far from the end the arm may leave its path for that of the next step, m, to pass there without a stop; 0 to stop at the end.
+    #[serde(default)]
+    #[schemars(transform = by(check::ZONE))]
+    pub zone: f64,
 }
 
 /// A change of the speed override: of the pace at which every move passes from then on, the one under way included.

@@ -152,6 +152,7 @@ impl Gate {
                 top: self.top,
                 clearance: 0.0,
                 speed: 1.0,
+                zone: 0.0,
             })
         };
         Scenario {

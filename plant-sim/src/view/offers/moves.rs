@@ -61,17 +61,25 @@ pub(super) fn moves(scenario: &Scenario, robot: &RobotModel) -> Group {
                 0.0,
                 "mm/s",
             ),
+            number(
+                "zone",
+                "Zone at the end (0: stop)",
+                [0.0, 300.0],
+                1.0,
+                0.0,
+                "mm",
+            ),
         ],
         buttons: vec![
             button(
                 "Jump",
                 "jump",
-                &["x", "y", "z", "yaw", "top", "clearance", "speed"],
+                &["x", "y", "z", "yaw", "top", "clearance", "speed", "zone"],
             ),
             button(
                 "Line",
                 "line",
-                &["x", "y", "z", "yaw", "speed", "tool_speed"],
+                &["x", "y", "z", "yaw", "speed", "tool_speed", "zone"],
             ),
             button(
                 "Arc",
@@ -86,6 +94,7 @@ pub(super) fn moves(scenario: &Scenario, robot: &RobotModel) -> Group {
                     "yaw",
                     "speed",
                     "tool_speed",
+                    "zone",
                 ],
             ),
         ],
