@@ -220,24 +220,27 @@ impl RunConfig {
     pub fn cycle_target(&self) -> Option<[f64; 4]> {
         let mut target = Some(self.scenario.start);
         for step in &self.scenario.cycle {
-            match step {
-                Step::Jump(jump) => target = Some(jump.to),
-                Step::Line(line) => target = Some(line.to),
-                Step::Arc(arc) => target = Some(arc.to),
-                Step::Joints(joints) => {
-                    let arm = Arm::new(&self.actual, None);
-                    let pose = arm.pose(&arm.at(&joints.to.into()));
-                    target = Some([pose.x, pose.y, pose.z, pose.yaw]);
-                }
-                Step::Stop(_) | Step::Estop(_) => target = None,
-                Step::Dwell(_)
-                | Step::Override(_)
-                | Step::Release(_)
-                | Step::Pick(_)
-                | Step::Place {} => {}
+            if matches!(step, Step::Stop(_) | Step::Estop(_)) {
+                target = None;
             }
+            target = self.target(step).or(target);
         }
         target
+    }
+
+    /// Where a step moves the tool: x, y, z, yaw; `None` where it is no move.
+    pub(crate) fn target(&self, step: &Step) -> Option<[f64; 4]> {
+        match step {
+            Step::Jump(jump) => Some(jump.to),
+            Step::Line(line) => Some(line.to),
+            Step::Arc(arc) => Some(arc.to),
+            Step::Joints(joints) => {
+                let arm = Arm::new(&self.actual, None);
+                let pose = arm.pose(&arm.at(&joints.to.into()));
+                Some([pose.x, pose.y, pose.z, pose.yaw])
+            }
+            _ => None,
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Summary of a run, gathered while it runs.
 
+mod corners;
 mod faults;
 mod injected;
 mod recipe;
@@ -18,6 +19,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use trace::ErrorFrame;
 
+pub use corners::Corner;
+use corners::Corners;
 pub use faults::Fault;
 use faults::Faults;
 pub use injected::Injected;
@@ -77,6 +80,8 @@ pub struct Summary {
     pub final_error_mm: FinalError,
     /// Yaw error from the target at the end of a dwell, mrad.
     pub final_error_mrad: FinalError,
+    /// Ends of moves with a zone, and how far from them the tool has passed.
+    pub corners: Vec<Corner>,
     /// Peak effort over its limit, by axis, of 1. Each motor keeps to its own; the wrist bears the torque of the lift's nut as
     /// well, and may have more.
     pub torque_utilisation: [f64; 4],
@@ -125,6 +130,7 @@ pub struct Collector {
     metrics: Metrics,
     judge: Judge,
     windows: Windows,
+    corners: Corners,
     thermometer: Thermometer,
     faults: Faults,
     /// The last state.
@@ -147,6 +153,7 @@ impl Collector {
             metrics: Metrics::new(&config.actual),
             judge: Judge::new(config),
             windows: Windows::new(&config.scenario),
+            corners: Corners::new(config),
             thermometer: Thermometer::new(&config.actual),
             faults: Faults::default(),
             state: None,
@@ -170,6 +177,7 @@ impl Collector {
             metrics,
             judge,
             windows,
+            corners,
             thermometer,
             faults,
             state,
@@ -217,6 +225,7 @@ impl Collector {
             final_error_mrad: FinalError {
                 max: metrics.final_error_mrad(),
             },
+            corners: corners.finish(),
             torque_utilisation: metrics.torque_utilisation(),
             thermal_utilisation: metrics.thermal_utilisation(),
             heat: thermometer.finish(),
@@ -298,6 +307,7 @@ impl Observer for Collector {
 
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         self.thermometer.sample(truth);
+        self.corners.sample(truth);
         let tracking = self.metrics.tracked(truth);
         let late = self
             .answered
@@ -318,10 +328,12 @@ impl Observer for Collector {
             CellEvent::BeginCycle => {
                 self.metrics.begin_cycle(self.target);
                 self.judge.begin_cycle();
+                self.corners.begin_cycle();
             }
             CellEvent::EndCycle => {
                 let before = self.metrics.cycles.len();
                 self.metrics.end_cycle();
+                self.corners.end_cycle();
                 self.judge.end_cycle(self.metrics.cycles.get(before));
             }
             CellEvent::Attach(_) | CellEvent::Release => {}

@@ -38,6 +38,7 @@ pub(super) fn report(results: &Results, config: &RunConfig, out: &Path) -> Strin
     );
     difference(config, &mut text);
     motion(summary, &mut text);
+    corners(summary, &mut text);
     load(summary, &mut text);
     let errors = match summary.bus_errors {
         0 => String::new(),
@@ -155,6 +156,21 @@ fn motion(summary: &Summary, text: &mut String) {
             text,
             "  final error       {distance:.4} mm max; yaw {yaw:.4} mrad max"
         );
+    }
+}
+
+/// Corners that the arm may cut.
+fn corners(summary: &Summary, text: &mut String) {
+    for (index, corner) in summary.corners.iter().enumerate() {
+        if let (Some(passed), Some(margin)) = (corner.passed_mm, corner.margin_mm) {
+            let name = if index == 0 { "corners passed" } else { "" };
+            line!(
+                text,
+                "  {name:<18}{} at {passed:.3} mm, zone {} mm, margin {margin:.3} mm",
+                corner.step,
+                (corner.zone_mm * 1e3).round() / 1e3
+            );
+        }
     }
 }
 
