@@ -16,7 +16,7 @@ use sim::setup::RunConfig;
 use sim::summary::Summary;
 
 /// What spoils a scenario, and the requirements that it then misses; none where the run does not end as it should.
-const TWINS: [(&str, &[&str], &[&str]); 20] = [
+const TWINS: [(&str, &[&str], &[&str]); 21] = [
     ("gate", &["law=pid"], &["tracking", "settling"]),
     ("gate-mismatch", &["law=pd-gravity"], &["tracking"]),
     ("gate-vertical", &["cycle[0].jump.speed=0.3"], &["cycle"]),
@@ -29,6 +29,7 @@ const TWINS: [(&str, &[&str], &[&str]); 20] = [
         &["tracking"],
     ),
     ("arc", &["law=pd-gravity"], &["tracking"]),
+    ("blend", &["law=pd-gravity"], &["tracking"]),
     (
         "pick-place",
         &["faults=[\"encoder:lift:jump=0.0005@0.6s\"]"],

@@ -9,7 +9,7 @@ macro_rules! built_in {
 }
 
 /// Scenarios that come with the program: name and text.
-const BUILT_IN: [(&str, &str); 20] = built_in![
+const BUILT_IN: [(&str, &str); 21] = built_in![
     "gate",
     "gate-mismatch",
     "gate-vertical",
@@ -18,6 +18,7 @@ const BUILT_IN: [(&str, &str); 20] = built_in![
     "override",
     "square",
     "arc",
+    "blend",
     "pick-place",
     "palletise",
     "screw",
