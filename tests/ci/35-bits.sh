@@ -87,7 +87,7 @@ echo "- with the controller on the emulated Cortex-M4F"
 source tests/ci/board.bash
 image=$(built mps2-an386 --bin mps2-an386)
 on_board=(--controller qemu --image "$image")
-grep -E '^(scenario|(gate|bus-off|link-loss|encoder-fault|estop-descent),(pid|computed-torque:observer)|square,computed-torque-task:observer|arc,computed-torque:observer|pick-place,computed-torque:observer),' \
+grep -E '^(scenario|(gate|bus-off|link-loss|encoder-fault|estop-descent),(pid|computed-torque:observer)|square,computed-torque-task:observer|(arc|blend),computed-torque:observer|pick-place,computed-torque:observer),' \
     "$table" >"$work/some"
 runs "$work/some" "${on_board[@]}" >"$work/board"
 compare "on the emulated board" "$work/board"
