@@ -104,7 +104,11 @@ fn what_the_lift_carries_is_weighed() {
         if bench.node.controller().queued() == 0 {
             let mut target: [f32; 4] = here(&bench).into();
             target[2] = heights.next().unwrap();
-            let frame = bench.motion(MotionRequest::MoveJoint { target, speed: 0.5 });
+            let frame = bench.motion(MotionRequest::MoveJoint {
+                target,
+                speed: 0.5,
+                zone: 0.0,
+            });
             bench.wire.to_node.push_back(frame);
         }
         let mut torque = Vector4::from(bench.command().torque);

@@ -101,7 +101,11 @@ fn a_slow_lift_is_held_where_it_is_when_the_arm_fails() {
             bench.enable();
             bench.follows = true;
             let target = [0.2, 1.5, target, 0.3];
-            let stroke = bench.motion(MotionRequest::MoveJoint { target, speed: 0.2 });
+            let stroke = bench.motion(MotionRequest::MoveJoint {
+                target,
+                speed: 0.2,
+                zone: 0.0,
+            });
             bench.wire.to_node.push_back(stroke);
             let lift = |bench: &Bench| bench.node.controller().reference().qd.z.abs();
             let reached = (0..1000).find(|_| {
