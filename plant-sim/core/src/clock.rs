@@ -1,4 +1,4 @@
-//! The clock by which the drives take their samples, when it is broken.
+//! The clock by which the drives take their samples, and what is broken in it.
 
 use oorandom::Rand64;
 use protocol::time::Duration;
@@ -12,43 +12,43 @@ pub enum ClockDefect {
     Misses(f64),
 }
 
-impl ClockDefect {
-    /// A clock with this defect.
-    pub(crate) fn seeded(self, seed: u64) -> BrokenClock {
-        BrokenClock {
-            defect: self,
-            random: Rand64::new(u128::from(seed) << 8 | 0xC1),
+/// The clock. Defects are in effect together.
+#[derive(Clone, Debug, Default)]
+pub struct Clock {
+    defects: Vec<(ClockDefect, Rand64)>,
+}
+
+impl Clock {
+    /// Breaks or repairs it; `seed` is that of the ticks it loses.
+    pub(crate) fn set(&mut self, defect: ClockDefect, seed: u64, is_broken: bool) {
+        let defects = &mut self.defects;
+        if is_broken {
+            let seed = (defects.len() as u128) << 72 | u128::from(seed) << 8 | 0xC1;
+            defects.push((defect, Rand64::new(seed)));
+        } else if let Some(at) = defects.iter().position(|(other, _)| *other == defect) {
+            defects.remove(at);
         }
     }
-}
 
-/// A clock that is broken.
-#[derive(Clone, Debug)]
-pub struct BrokenClock {
-    defect: ClockDefect,
-    random: Rand64,
-}
-
-impl BrokenClock {
-    /// Time until the next tick, of which there is one a `period` while `clock` is sound.
-    pub(crate) fn tick(clock: &Option<Self>, period: Duration) -> Duration {
-        match clock {
-            Some(Self {
-                defect: ClockDefect::Drift(share),
-                ..
-            }) => Duration::from_nanos((period.nanos() as f64 / (1.0 + share)).round() as u64),
-            _ => period,
+    /// Time until the next tick, of which there is one a `period` while it is sound.
+    pub(crate) fn tick(&self, period: Duration) -> Duration {
+        let mut nanos = period.nanos() as f64;
+        for (defect, _) in &self.defects {
+            if let ClockDefect::Drift(share) = defect {
+                nanos /= 1.0 + share;
+            }
         }
+        Duration::from_nanos(nanos.round() as u64)
     }
 
     /// Whether the present tick is lost.
-    pub(crate) fn misses(clock: &mut Option<Self>) -> bool {
-        match clock {
-            Some(Self {
-                defect: ClockDefect::Misses(share),
-                random,
-            }) => random.rand_float() < *share,
-            _ => false,
+    pub(crate) fn misses(&mut self) -> bool {
+        let mut missed = false;
+        for (defect, random) in &mut self.defects {
+            if let ClockDefect::Misses(share) = defect {
+                missed |= random.rand_float() < *share;
+            }
         }
+        missed
     }
 }

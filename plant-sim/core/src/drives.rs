@@ -18,7 +18,6 @@ use protocol::parameters::{self, DriveParameter};
 use protocol::table;
 use protocol::time::{Instant, Period};
 
-use crate::clock::BrokenClock;
 use crate::heart::Heart;
 use crate::model::{DriveTrain, RobotModel};
 use crate::peer::{Outbox, Peer, PeerError};
@@ -275,8 +274,8 @@ impl Peer for Drives {
             None => {
                 let period = self.period.duration();
                 self.beat(now, plant, out);
-                self.next = now + BrokenClock::tick(clock, period);
-                if BrokenClock::misses(clock) {
+                self.next = now + clock.tick(period);
+                if clock.misses() {
                     self.watchdog(now, plant);
                 } else {
                     plant.advance_to(now.nanos());

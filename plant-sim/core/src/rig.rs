@@ -18,6 +18,7 @@ use protocol::time::{Duration, Instant, Period};
 use protocol::wire::BitTiming;
 
 use crate::bus::{BuiltinBus, Delivery, NodeId, Statistics};
+use crate::clock::Clock;
 use crate::model::RobotModel;
 use crate::observer::{Observer, Pace, PlantState, Truth};
 use crate::peer::{Outbox, Peer, PeerError};
@@ -118,7 +119,7 @@ impl<'p> Rig<'p> {
                 plant: Plant::new(&config.actual, config.start),
                 mind: Mind::BLANK,
                 sample: None,
-                clock: None,
+                clock: Clock::default(),
                 cell_events: Vec::new(),
                 outcome: None,
             },

@@ -7,7 +7,7 @@ use protocol::codec::DecodeError;
 use protocol::messages::{Fault, Mode, MotionRequest, Refusal};
 use protocol::time::{Duration, Instant};
 
-use crate::clock::BrokenClock;
+use crate::clock::Clock;
 use crate::model::Payload;
 use crate::plant::Plant;
 use crate::refusal::sentence;
@@ -22,8 +22,8 @@ pub struct World {
     pub mind: Mind,
     /// Number of the sample that the drives have taken in the present one of the rig; `None` if they have not.
     pub sample: Option<u32>,
-    /// The clock by which the drives take their samples; `None` while it is sound.
-    pub clock: Option<BrokenClock>,
+    /// The clock by which the drives take their samples.
+    pub clock: Clock,
     /// Events in the cell during this call.
     pub cell_events: Vec<CellEvent>,
     /// Outcome of the operator's scenario, once it has ended.

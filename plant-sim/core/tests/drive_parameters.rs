@@ -17,6 +17,7 @@ use protocol::messages::{
 use protocol::parameters::{self, ControllerParameter, DriveParameter};
 use protocol::table;
 use protocol::time::{Instant, Period};
+use sim::clock::Clock;
 use sim::controller::InProcess;
 use sim::drives::Drives;
 use sim::model::RobotModel;
@@ -53,7 +54,7 @@ impl Bench {
                 plant: Plant::new(&model, START),
                 mind: Mind::BLANK,
                 sample: None,
-                clock: None,
+                clock: Clock::default(),
                 cell_events: Vec::new(),
                 outcome: None,
             },

@@ -22,6 +22,7 @@ use protocol::messages::{Cause, Command, ControlWord, Message, Mode, Node};
 use protocol::table;
 use protocol::time::{Duration, Instant};
 use record::Record;
+use sim::clock::Clock;
 use sim::faults::{Fault, Faulty};
 use sim::peer::{Outbox, Peer, PeerError};
 use sim::rig::Rig;
@@ -70,7 +71,7 @@ fn survivors(fault: &str, count: u32, seed: u64) -> Vec<u32> {
         plant: sim::plant::Plant::new(&config.actual, config.start),
         mind: Mind::BLANK,
         sample: None,
-        clock: None,
+        clock: Clock::default(),
         cell_events: Vec::new(),
         outcome: None,
     };

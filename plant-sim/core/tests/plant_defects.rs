@@ -26,7 +26,7 @@ fn a_slow_encoder_follows_with_its_time_constant() {
     let constant = 0.02;
     let mut plant = plant();
     plant.set_speed([3.0, 0.0, 0.0, 0.0]);
-    plant.break_encoder(0, Some(EncoderDefect::Slow(constant)), 0);
+    plant.break_encoder(0, EncoderDefect::Slow(constant), 0, true);
     let mut exact = f64::from(plant.encoder_counts()[0]);
     let mut before = exact;
     for sample in 1..=100_u64 {
@@ -46,9 +46,9 @@ fn a_slow_encoder_follows_with_its_time_constant() {
         );
     }
     // Repaired, it is right at once.
-    plant.break_encoder(0, None, 0);
+    plant.break_encoder(0, EncoderDefect::Slow(constant), 0, false);
     assert_eq!(plant.latch().counts, plant.encoder_counts());
-    plant.break_encoder(0, Some(EncoderDefect::Slow(0.0)), 0);
+    plant.break_encoder(0, EncoderDefect::Slow(0.0), 0, true);
     plant.advance_to(110 * MS);
     assert_eq!(plant.latch().counts, plant.encoder_counts());
 }
@@ -57,7 +57,7 @@ fn a_slow_encoder_follows_with_its_time_constant() {
 #[test]
 fn a_slow_brake_takes_longer() {
     let mut plant = plant();
-    plant.break_brake(Some(BrakeDefect::Slow(0.2)));
+    plant.break_brake(BrakeDefect::Slow(0.2), true);
     plant.set_brake(false);
     let due = Brake::RELEASE_NS + 200 * MS;
     plant.advance_to(due - 1);
@@ -78,7 +78,7 @@ fn a_brake_that_is_stuck_open_lets_the_lift_fall() {
     model.drive.coulomb = [0.0; 4];
     model.drive.viscous = [0.0; 4];
     let mut plant = Plant::new(&model, [0.2, 0.8, 0.1, 0.0]);
-    plant.break_brake(Some(BrakeDefect::StuckOpen));
+    plant.break_brake(BrakeDefect::StuckOpen, true);
     plant.set_brake(true);
     plant.advance_to(100 * MS);
     let mass = model.links[2].mass + model.links[3].mass;
@@ -91,7 +91,7 @@ fn a_brake_that_is_stuck_open_lets_the_lift_fall() {
         "{fall} {free}"
     );
     // Repaired, it does what it was told.
-    plant.break_brake(None);
+    plant.break_brake(BrakeDefect::StuckOpen, false);
     plant.advance_to(300 * MS);
     assert!(plant.brake().is_closed() && plant.brake().is_sticking());
 }
@@ -101,11 +101,11 @@ fn a_brake_that_is_stuck_closed_holds() {
     let mut plant = plant();
     plant.set_brake(false);
     plant.advance_to(60 * MS);
-    plant.break_brake(Some(BrakeDefect::StuckClosed));
+    plant.break_brake(BrakeDefect::StuckClosed, true);
     plant.set_brake(false);
     plant.advance_to(200 * MS);
     assert!(plant.brake().is_sticking());
-    plant.break_brake(None);
+    plant.break_brake(BrakeDefect::StuckClosed, false);
     plant.advance_to(260 * MS);
     assert!(!plant.brake().is_closed());
 }
@@ -177,7 +177,7 @@ fn a_runaway_motor_keeps_to_its_limit_and_the_wrist_has_two() {
     let limit = model.drive.motor_torque_limit;
     plant.set_torque_enabled(true);
     plant.set_motor_torque([0.0, 0.0, 2.0 * limit[2], 0.0]);
-    plant.break_motor(3, Some(MotorDefect::Runaway));
+    plant.break_motor(3, MotorDefect::Runaway, true);
     assert_eq!(plant.motor_torque(), [0.0, 0.0, limit[2], limit[3]]);
     let wrist = plant.joint_effort()[3];
     let own = limit[3] * model.drive.gear_ratio[3];
@@ -185,4 +185,67 @@ fn a_runaway_motor_keeps_to_its_limit_and_the_wrist_has_two() {
     assert!((own - model.limits.effort[3]).abs() < 1e-12);
     assert!((wrist - own - nut).abs() < 1e-12, "{wrist} {own} {nut}");
     assert!(wrist > 1.1 * model.limits.effort[3], "{wrist}");
+}
+
+/// Whatever is broken in the same place is broken together, and each part of it ends by itself.
+#[test]
+fn defects_of_the_same_part_add_up() {
+    let mut plant = plant();
+    plant.set_speed([3.0, 0.0, 0.0, 0.0]);
+    let stuck = plant.encoder_counts()[0];
+    plant.break_encoder(0, EncoderDefect::Stuck, 0, true);
+    plant.break_encoder(0, EncoderDefect::Jump(0.5), 0, true);
+    plant.break_encoder(0, EncoderDefect::BitLost(0), 0, true);
+    plant.advance_to(20 * MS);
+    let drive = RobotModel::irb_930_22_105().drive;
+    let turns = 0.5 * drive.gear_ratio[0] / std::f64::consts::TAU;
+    let off = (turns * f64::from(drive.encoder_counts)).round() as i32;
+    assert_eq!(plant.latch().counts[0], (stuck + off) & !1);
+    plant.break_encoder(0, EncoderDefect::Jump(0.5), 0, false);
+    assert_eq!(plant.latch().counts[0], stuck & !1);
+    plant.break_encoder(0, EncoderDefect::Stuck, 0, false);
+    assert_eq!(plant.latch().counts[0], plant.encoder_counts()[0] & !1);
+
+    plant.set_torque_enabled(true);
+    plant.break_motor(1, MotorDefect::Runaway, true);
+    plant.break_motor(1, MotorDefect::Weak(0.5), true);
+    let peak = drive.motor_torque_limit[1];
+    assert_eq!(plant.motor_torque()[1], 0.5 * peak);
+    plant.break_motor(1, MotorDefect::Dip, true);
+    plant.break_motor(1, MotorDefect::Runaway, false);
+    assert!(plant.has_dip());
+    plant.break_motor(1, MotorDefect::Dip, false);
+    assert!(!plant.has_dip());
+    plant.set_motor_torque([0.0, 0.1 * peak, 0.0, 0.0]);
+    assert_eq!(plant.motor_torque()[1], 0.1 * peak * 0.5);
+
+    let weight = |plant: &Plant| plant.arm().gravity(&plant.arm().at(&plant.q().into()))[2];
+    let (before, g) = (weight(&plant), RobotModel::irb_930_22_105().gravity);
+    for kg in [3.0, 4.0] {
+        plant.disturb_load(LoadDefect::Heavier(kg), true);
+    }
+    assert!((before - weight(&plant) - 7.0 * g).abs() < 1e-9);
+    plant.disturb_load(LoadDefect::Heavier(3.0), false);
+    assert!((before - weight(&plant) - 4.0 * g).abs() < 1e-9);
+}
+
+/// A brake that is stuck open stays so while it is slow as well, and after that.
+#[test]
+fn a_brake_is_stuck_as_long_as_one_defect_says_so() {
+    let mut plant = plant();
+    plant.break_brake(BrakeDefect::StuckOpen, true);
+    plant.break_brake(BrakeDefect::Slow(0.1), true);
+    plant.set_brake(true);
+    plant.advance_to(500 * MS);
+    assert!(!plant.brake().is_closed());
+    plant.break_brake(BrakeDefect::StuckClosed, true);
+    assert!(plant.brake().is_closed());
+    plant.break_brake(BrakeDefect::StuckClosed, false);
+    assert!(!plant.brake().is_closed());
+    plant.break_brake(BrakeDefect::StuckOpen, false);
+    let due = 500 * MS + Brake::ENGAGE_NS + 100 * MS;
+    plant.advance_to(due - 1);
+    assert!(!plant.brake().is_closed());
+    plant.advance_to(due);
+    assert!(plant.brake().is_closed());
 }

@@ -71,15 +71,13 @@ impl Injector {
 fn act(world: &mut World, what: What, is_broken: bool, seed: u64) {
     let plant = &mut world.plant;
     match what {
-        What::Encoder(axis, defect) => {
-            plant.break_encoder(axis, is_broken.then_some(defect), seed);
-        }
-        What::Motor(axis, defect) => plant.break_motor(axis, is_broken.then_some(defect)),
-        What::Brake(defect) => plant.break_brake(is_broken.then_some(defect)),
+        What::Encoder(axis, defect) => plant.break_encoder(axis, defect, seed, is_broken),
+        What::Motor(axis, defect) => plant.break_motor(axis, defect, is_broken),
+        What::Brake(defect) => plant.break_brake(defect, is_broken),
         // A payload that has fallen out does not come back.
         What::Load(LoadDefect::Dropped) if is_broken => plant.release(),
         What::Load(defect) => plant.disturb_load(defect, is_broken),
-        What::Clock(defect) => world.clock = is_broken.then(|| defect.seeded(seed)),
+        What::Clock(defect) => world.clock.set(defect, seed, is_broken),
         _ => {}
     }
 }

@@ -59,16 +59,17 @@ pub enum LoadDefect {
     Caught(f64),
 }
 
-/// What is broken.
+/// What is broken. Defects of the same part are in effect together, in the order in which they began.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Defects {
-    encoders: [Option<BrokenEncoder>; 4],
-    motors: [Option<MotorDefect>; 4],
+    encoders: [Vec<BrokenEncoder>; 4],
+    motors: [Vec<MotorDefect>; 4],
+    brake: Vec<BrakeDefect>,
     /// While the brake is stuck: its last command, `true` to close.
-    brake: Option<bool>,
+    told: Option<bool>,
     /// What the flange carries besides its payload, kg.
-    extra: f64,
-    spring: Option<Spring>,
+    extra: Vec<f64>,
+    springs: Vec<Spring>,
 }
 
 /// A spring between a place and the flange.
@@ -94,40 +95,69 @@ struct BrokenEncoder {
 }
 
 impl Plant {
-    /// Breaks or repairs the encoder of `axis`; `seed` is that of its noise.
-    pub fn break_encoder(&mut self, axis: usize, defect: Option<EncoderDefect>, seed: u64) {
-        let held = self.encoder_counts()[axis];
+    /// Breaks or repairs the encoder of `axis`; `seed` is that of its noise. What is broken besides stays so: the later defect acts on what
+    /// the earlier one leaves of the reading.
+    pub fn break_encoder(
+        &mut self,
+        axis: usize,
+        defect: EncoderDefect,
+        seed: u64,
+        is_broken: bool,
+    ) {
+        let right = self.encoder_counts();
+        let held = self.defects.read(right, self.now)[axis];
         let counts = self.encoder.counts_per_radian() * self.drive.ratio(axis);
-        self.defects.encoders[axis] = defect.map(|defect| BrokenEncoder {
+        let broken = &mut self.defects.encoders[axis];
+        // The same defect twice at once is not the same noise.
+        let seed = (broken.len() as u128) << 72 | u128::from(seed) << 8 | axis as u128;
+        let defect = BrokenEncoder {
             defect,
             held,
             last: held,
             time: self.now,
             lag: 0.0,
             counts,
-            random: Rand64::new(u128::from(seed) << 8 | axis as u128),
-        });
+            random: Rand64::new(seed),
+        };
+        set(
+            broken,
+            defect,
+            |one, other| one.defect == other.defect,
+            is_broken,
+        );
     }
 
     /// Breaks or repairs the motor of `axis`.
-    pub fn break_motor(&mut self, axis: usize, defect: Option<MotorDefect>) {
-        self.defects.motors[axis] = defect;
+    pub fn break_motor(&mut self, axis: usize, defect: MotorDefect, is_broken: bool) {
+        set(
+            &mut self.defects.motors[axis],
+            defect,
+            PartialEq::eq,
+            is_broken,
+        );
     }
 
-    /// Breaks or repairs the brake. One that is repaired does what it was told last.
-    pub fn break_brake(&mut self, defect: Option<BrakeDefect>) {
-        let told = self.defects.brake.unwrap_or(self.brake.is_engaged());
-        self.brake.delay(match defect {
-            Some(BrakeDefect::Slow(seconds)) => (seconds * 1e9).round() as u64,
+    /// Breaks or repairs the brake. One that is repaired does what it was told last. Where it is stuck in several ways, it is where the last
+    /// of them put it.
+    pub fn break_brake(&mut self, defect: BrakeDefect, is_broken: bool) {
+        let told = self.defects.told.unwrap_or(self.brake.is_engaged());
+        let defects = &mut self.defects.brake;
+        set(defects, defect, PartialEq::eq, is_broken);
+        let slow = |defect: &BrakeDefect| match defect {
+            BrakeDefect::Slow(seconds) => (seconds * 1e9).round() as u64,
             _ => 0,
-        });
-        match defect {
-            Some(BrakeDefect::StuckOpen) => self.brake.force(false),
-            Some(BrakeDefect::StuckClosed) => self.brake.force(true),
-            Some(BrakeDefect::Stuck | BrakeDefect::Slow(_)) | None => {}
+        };
+        self.brake.delay(defects.iter().map(slow).sum());
+        let place = |defect: &BrakeDefect| match defect {
+            BrakeDefect::StuckOpen => Some(false),
+            BrakeDefect::StuckClosed => Some(true),
+            BrakeDefect::Stuck | BrakeDefect::Slow(_) => None,
+        };
+        if let Some(closed) = defects.iter().rev().find_map(place) {
+            self.brake.force(closed);
         }
-        let is_stuck = !matches!(defect, Some(BrakeDefect::Slow(_)) | None);
-        self.defects.brake = is_stuck.then_some(told);
+        let is_stuck = |defect: &BrakeDefect| !matches!(defect, BrakeDefect::Slow(_));
+        self.defects.told = defects.iter().any(is_stuck).then_some(told);
         self.set_brake(told);
     }
 
@@ -136,19 +166,31 @@ impl Plant {
         match defect {
             LoadDefect::Dropped => {}
             LoadDefect::Heavier(kg) => {
-                self.defects.extra = if is_broken { kg } else { 0.0 };
+                set(&mut self.defects.extra, kg, PartialEq::eq, is_broken);
                 self.hold(self.payload);
             }
             LoadDefect::Caught(stiffness) => {
                 let (at, _) = self.arm.flange(&self.arm.at(&self.q));
-                self.defects.spring = is_broken.then_some(Spring { stiffness, at });
+                let is_same = |one: &Spring, other: &Spring| one.stiffness == other.stiffness;
+                let spring = Spring { stiffness, at };
+                set(&mut self.defects.springs, spring, is_same, is_broken);
             }
         }
     }
 
     /// Whether a drive has no power.
     pub fn has_dip(&self) -> bool {
-        self.defects.motors.contains(&Some(MotorDefect::Dip))
+        let mut motors = self.defects.motors.iter();
+        motors.any(|motor| motor.contains(&MotorDefect::Dip))
+    }
+}
+
+/// Adds a defect to those of a part, or takes the first that is the same from them.
+fn set<T>(defects: &mut Vec<T>, defect: T, is_same: impl Fn(&T, &T) -> bool, is_broken: bool) {
+    if is_broken {
+        defects.push(defect);
+    } else if let Some(at) = defects.iter().position(|other| is_same(other, &defect)) {
+        defects.remove(at);
     }
 }
 
@@ -156,21 +198,26 @@ impl Defects {
     /// Readings of the encoders instead of the right ones.
     pub(super) fn read(&mut self, mut counts: [i32; 4], now: u64) -> [i32; 4] {
         for (reading, broken) in counts.iter_mut().zip(&mut self.encoders) {
-            if let Some(broken) = broken {
+            for broken in broken {
                 *reading = broken.read(*reading, now);
             }
         }
         counts
     }
 
-    /// Torques of the motors instead of those that sound ones would give; `peak` are the greatest.
+    /// Torques of the motors instead of those that sound ones would give; `peak` are the greatest. A motor that runs away and is weak
+    /// gives that share of its peak, and none of it without power.
     pub(super) fn torque(&self, mut torque: Vector4<f64>, peak: &[f64; 4]) -> Vector4<f64> {
         for (axis, motor) in self.motors.iter().enumerate() {
-            match motor {
-                None => {}
-                Some(MotorDefect::Dip) => torque[axis] = 0.0,
-                Some(MotorDefect::Weak(share)) => torque[axis] *= share,
-                Some(MotorDefect::Runaway) => torque[axis] = peak[axis],
+            if motor.contains(&MotorDefect::Runaway) {
+                torque[axis] = peak[axis];
+            }
+            for defect in motor {
+                match defect {
+                    MotorDefect::Dip => torque[axis] = 0.0,
+                    MotorDefect::Weak(share) => torque[axis] *= share,
+                    MotorDefect::Runaway => {}
+                }
             }
         }
         torque
@@ -178,7 +225,7 @@ impl Defects {
 
     /// Whether a command of the brake gets through; one that does not is remembered.
     pub(super) fn brake_follows(&mut self, engaged: bool) -> bool {
-        match &mut self.brake {
+        match &mut self.told {
             None => true,
             Some(last) => {
                 *last = engaged;
@@ -191,12 +238,12 @@ impl Defects {
 impl Defects {
     /// What the flange carries in truth, of a payload that is all that was meant.
     pub(super) fn burden(&self, payload: Option<Payload>) -> Option<Payload> {
-        burdened(payload, self.extra)
+        burdened(payload, self.extra.iter().sum())
     }
 
     /// Adds the efforts of the spring at the joints.
     pub(super) fn pull(&self, arm: &Arm, at: &Configuration, effort: &mut Vector4<f64>) {
-        if let Some(spring) = self.spring {
+        for spring in &self.springs {
             let force = (spring.at - arm.flange(at).0) * spring.stiffness;
             *effort += arm.jacobian(at).fixed_rows::<3>(0).transpose() * force;
         }
@@ -204,9 +251,10 @@ impl Defects {
 
     /// Energy in the spring, J.
     pub(super) fn elastic(&self, arm: &Arm, at: &Configuration) -> f64 {
-        self.spring.map_or(0.0, |spring| {
+        let energy = |spring: &Spring| {
             0.5 * spring.stiffness * (arm.flange(at).0 - spring.at).norm_squared()
-        })
+        };
+        self.springs.iter().map(energy).sum()
     }
 }
 
