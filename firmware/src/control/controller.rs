@@ -233,7 +233,7 @@ impl Controller {
             self.saturated = 0;
             self.chatter = Chatter::new();
             self.let_go();
-            return self.torque_off();
+            return self.act(Vector4::zeros());
         }
         let period = self.period;
         let lead = self.setup.command_delay + 0.5 * period;
@@ -308,7 +308,7 @@ impl Controller {
                 // No finite input leads here; should it happen, close the brake.
                 self.unlearn();
                 self.fail(Fault::because(Cause::BadValue));
-                return self.torque_off();
+                return self.act(Vector4::zeros());
             }
             self.limits = self.limits | limited.flags;
             self.ease(&torque, &qd);
@@ -321,10 +321,19 @@ impl Controller {
             self.watch_tool(&q, &qd);
         }
         probe.end(Phase::Limits);
-        Actions {
-            control: self.control_word(),
-            torque: self.released(limited.motor_torque).into(),
-        }
+        self.act(limited.motor_torque)
+    }
+
+    /// What the drives are to do in this state, which may be another one than the torques were meant for: they have none that is not
+    /// enabled in the same command.
+    pub(super) fn act(&mut self, torque: Vector4<f32>) -> Actions {
+        let control = self.control_word();
+        let torque = if control.contains(ControlWord::TORQUE_ENABLE) {
+            self.released(torque).into()
+        } else {
+            [0.0; 4]
+        };
+        Actions { control, torque }
     }
 
     /// What of these motor torques the drives may have: none for the arm where it has to be without; and from enabling on as much as builds up
@@ -342,14 +351,6 @@ impl Controller {
     fn unlearn(&mut self) {
         self.memory = Memory::new();
         self.observer = MomentumObserver::new();
-    }
-
-    /// Torque off; the brake holds the lift.
-    fn torque_off(&self) -> Actions {
-        Actions {
-            control: self.control_word(),
-            torque: [0.0; 4],
-        }
     }
 
     fn reply(&mut self, sequence: u8, outcome: Outcome) {

@@ -204,11 +204,21 @@ impl Bench {
                 break;
             }
         }
-        self.wire
-            .from_node
-            .drain(..)
-            .map(|frame| decode(&frame).expect("a node sends valid frames").message)
-            .collect()
+        let sent = self.wire.from_node.drain(..);
+        let sent = sent.map(|frame| decode(&frame).expect("a node sends valid frames").message);
+        sent.inspect(|message| {
+            if let Message::Command(Command {
+                control, torque, ..
+            }) = message
+                && !control.contains(ControlWord::TORQUE_ENABLE)
+            {
+                assert_eq!(
+                    *torque, [0.0; 4],
+                    "whatever is not enabled is not asked for"
+                );
+            }
+        })
+        .collect()
     }
 
     /// One sample with the pending frames; returns what the node sent.

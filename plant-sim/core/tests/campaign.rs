@@ -48,6 +48,7 @@ enum Defect {
     BrakeLate,
     TorqueStaysOn,
     TorqueBeyondTheLimit,
+    TorqueNotEnabled,
     MovesAfterStandstill,
     // In what it reports.
     Mute,
@@ -64,7 +65,7 @@ enum Defect {
 }
 
 /// Each with the requirement that it breaks.
-const DEFECTS: [(Defect, Requirement); 23] = [
+const DEFECTS: [(Defect, Requirement); 24] = [
     (Defect::FollowingErrorUnwatched, Requirement::Reported),
     (Defect::SlowMonitor, Requirement::Reported),
     (Defect::BadFramesIgnored, Requirement::Detected),
@@ -78,6 +79,7 @@ const DEFECTS: [(Defect, Requirement); 23] = [
     (Defect::BrakeLate, Requirement::Drop),
     (Defect::TorqueStaysOn, Requirement::Standstill),
     (Defect::TorqueBeyondTheLimit, Requirement::Torque),
+    (Defect::TorqueNotEnabled, Requirement::Torque),
     (Defect::MovesAfterStandstill, Requirement::Latch),
     (Defect::Mute, Requirement::Detected),
     (Defect::LateReport, Requirement::Detected),
@@ -229,6 +231,9 @@ impl Planted {
             }
             Some(Defect::TorqueBeyondTheLimit) => {
                 command.torque = command.torque.map(|torque| 1.5 * torque);
+            }
+            Some(Defect::TorqueNotEnabled) if !sound.contains(torque) => {
+                command.torque[0] = 0.01;
             }
             Some(Defect::MovesAfterStandstill) if later(self.off, 20) && !later(self.off, 30) => {
                 command.control = torque;

@@ -159,13 +159,7 @@ impl Controller {
             }
             Felt::Nothing => {}
         }
-        if !self.state.is_powered() {
-            return self.torque_off();
-        }
-        Actions {
-            control: self.control_word(),
-            torque: self.released(self.chatter.last()).into(),
-        }
+        self.act(self.chatter.last())
     }
 
     /// Samples that have passed besides those that the drives have counted since the last one.

@@ -2,7 +2,7 @@
 //!
 //! | bound | where from |
 //! |---|---|
-//! | no motor is asked for more than its peak torque | model |
+//! | no motor is asked for more than its peak torque, and for none while torque is not enabled | model |
 //! | an axis off its reference, too fast or out of its range is reported at the 4th sample in a row | default parameters: three samples, and one to answer |
 //! | torque is off 0.7 s after a fault was reported, with 22 kg | 1.25 times the time in which the slowest axis of the stretched arm stops from full speed with the torque that its weight leaves, and the time of the brake |
 //! | a brake that stays open is reported 60 ms and 8 samples after it was to close | the time of the brake, and of two controllers' answers |
@@ -78,8 +78,11 @@ impl Bounds {
         self.payload = payload.mass;
     }
 
-    /// Whether the motors may be asked for these torques, N m.
-    pub fn allows_torque(&self, torque: &[f32; 4]) -> bool {
+    /// Whether the motors may be asked for these torques, N m: for none while torque is not enabled.
+    pub fn allows_torque(&self, torque: &[f32; 4], is_enabled: bool) -> bool {
+        if !is_enabled {
+            return *torque == [0.0; 4];
+        }
         let limits = self.model.drive.motor_torque_limit;
         let mut both = torque.iter().zip(limits);
         both.all(|(asked, limit)| f64::from(asked.abs()) <= limit * (1.0 + ROUNDING))

@@ -210,7 +210,8 @@ impl Judge {
     /// The controller has commanded the drives.
     fn commanded(&mut self, time: Instant, command: &Command) {
         let control = command.control;
-        if !self.bounds.allows_torque(&command.torque) {
+        let is_enabled = control.contains(ControlWord::TORQUE_ENABLE);
+        if !self.bounds.allows_torque(&command.torque, is_enabled) {
             self.miss(Requirement::Torque);
         }
         let Some(before) = self.newest.take(time, command) else {

@@ -21,7 +21,7 @@ pub enum Requirement {
     Reported,
     /// The first command after the report stops the arm, at most one sample later.
     Reaction,
-    /// No motor is asked for more torque than it can give.
+    /// No motor is asked for more torque than it can give, or for any that is not enabled.
     Torque,
     /// Torque goes off in time.
     Standstill,
