@@ -98,7 +98,7 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::SoftLimit => "position against range",
         Cause::EStop => "emergency stop on the bus",
         Cause::DriveFault => {
-            "status of the drives: a fault, torque off by themselves, a brake that does not close or opens by itself"
+            "status of the drives: a fault, torque off by themselves, a brake that does not close or open, or does so by itself"
         }
         Cause::EncoderFault => {
             "status of the drives; a jump no axis can make; away from the reference, faster and faster, against the torque"

@@ -128,7 +128,9 @@ duplicate-node --fault command:forged@0.45s
 following-error --fault motor:elbow:dead@0.45s
 following-error --fault motor:elbow:runaway@0.45s
 stuck-sensor --fault encoder:elbow:stuck@0.45s
-stuck-sensor --fault brake:stuck@0s
+drive-fault --fault brake:stuck@0s
+drive-fault --fault brake:stuck-open@0s
+drive-fault --fault brake:stuck-closed@0.4s
 over-torque --payload 22 --fault motor:wrist:dead@0.6994s
 over-speed --set operation="manual" --fault motor:elbow:runaway@0.45s
 soft-limit --fault encoder:elbow:jump=2.8@0s

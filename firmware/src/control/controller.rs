@@ -105,8 +105,8 @@ pub struct Controller {
     held: u16,
     /// Share of its torques that the arm gets: they build up from enabling on.
     built_up: f32,
-    /// Samples without torque in a row in which the brake was not closed either.
-    unheld: u32,
+    /// Samples in a row in which the brake was not where it had to be by now: not closed without torque, or not open.
+    misplaced: u32,
     /// First fault since the last reset.
     fault: Fault,
     /// Whether only the shaft is under torque until the brake has closed: shoulder or elbow has to be without.
@@ -167,7 +167,7 @@ impl Controller {
             operation: Operation::Automatic,
             held: 0,
             built_up: 0.0,
-            unheld: 0,
+            misplaced: 0,
             too_fast: 0,
             fault: Fault::NONE,
             limp: false,

@@ -54,10 +54,12 @@ pub(crate) struct Bench {
     pub velocity: [f32; 4],
     /// Thousandths of the rated torques.
     pub torque: [i16; 4],
-    /// What the drives report besides whether torque is on.
+    /// What the drives report besides whether torque is on and the brake open.
     pub status: DriveStatus,
     /// Whether the drives do what the control word says.
     pub obeys: bool,
+    /// Whether the brake opens when it is told to; at once.
+    pub opens: bool,
     pub follows: bool,
     pub off: Vector4<f32>,
     period: Duration,
@@ -83,6 +85,7 @@ impl Bench {
             torque: [0; 4],
             status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
             obeys: true,
+            opens: true,
             follows: false,
             off: Vector4::zeros(),
             period: config.period.duration(),
@@ -181,9 +184,14 @@ impl Bench {
         }
         let word = self.node.controller().control_word();
         let is_on = self.obeys && word.contains(ControlWord::TORQUE_ENABLE);
+        let status = if self.opens && word.contains(ControlWord::BRAKE_RELEASE) {
+            self.status | DriveStatus::BRAKE_RELEASED
+        } else {
+            self.status
+        };
         let feedback = Feedback {
             sample: self.sample,
-            status: self.status.with(DriveStatus::TORQUE_ON, is_on),
+            status: status.with(DriveStatus::TORQUE_ON, is_on),
             position: self.position,
             velocity: self.velocity,
             torque: self.torque,

@@ -265,6 +265,7 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
 /// Every cause of the fault table can be raised, is latched, sent once, and repeated in the state with its number.
 #[test]
 fn every_cause_of_the_table_is_raised_and_reported_in_words() {
+    let up = "drive status ready torque-on brake-released";
     for cause in Cause::ALL {
         let in_table = REACTIONS.iter().any(|row| row.cause == *cause);
         let raised = raise(*cause);
@@ -298,10 +299,8 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::OverSpeed => "over speed, axis 3 (lift): 2.43 m/s, limit 2.42 m/s".into(),
             Cause::SoftLimit => "soft limit, axis 2 (elbow): 2.560 rad, limit 2.551 rad".into(),
             Cause::EStop => "estop".to_owned(),
-            Cause::DriveFault => {
-                "drive fault: drive status ready torque-on fault encoder-valid".into()
-            }
-            Cause::EncoderFault => "encoder fault: drive status ready torque-on".into(),
+            Cause::DriveFault => format!("drive fault: {up} fault encoder-valid"),
+            Cause::EncoderFault => format!("encoder fault: {up}"),
             Cause::Collision => "collision, axis 3 (lift): 1874.9 N, limit 430.0 N".into(),
             Cause::Chatter => "chatter, axis 2 (elbow): 81 %, limit 80 %".into(),
             Cause::Overload => "overload, axis 3 (lift): 120.1 %, limit 120.0 %".into(),

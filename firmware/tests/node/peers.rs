@@ -281,7 +281,7 @@ fn drives_that_switch_off_by_themselves_are_a_fault() {
     );
     assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
     assert_eq!(bench.mode(), Mode::Fault);
-    let status = "drive fault: drive status ready encoder-valid";
+    let status = "drive fault: drive status ready brake-released encoder-valid";
     assert_eq!(bench.node.controller().fault().to_string(), status);
 }
 

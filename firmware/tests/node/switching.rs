@@ -291,3 +291,95 @@ fn a_fault_of_an_arm_that_is_ready_stays_until_it_is_reset() {
         assert_eq!(bench.mode(), expected, "{cause}");
     }
 }
+
+/// Its time is 60 ms, and it has as much again: nothing is enabled that may be held, also when it was enabled before.
+#[test]
+fn a_brake_that_does_not_open_is_told_and_lets_nothing_be_enabled() {
+    for again in [false, true] {
+        let mut bench = Bench::asked_to_enable().0;
+        if again {
+            bench.run(100);
+            bench.request(MotionRequest::Disable);
+            let enable = bench.motion(MotionRequest::Enable);
+            bench.wire.to_node.push_back(enable);
+        }
+        assert_eq!(bench.mode(), Mode::Ready);
+        bench.opens = false;
+        let mut opening = 0;
+        loop {
+            bench.step();
+            match bench.mode() {
+                Mode::Ready => {}
+                Mode::Enabling => opening += 1,
+                Mode::FaultReaction => break,
+                other => panic!("{other:?} after {opening} samples"),
+            }
+        }
+        assert!((110..=122).contains(&opening), "{opening}");
+        let fault = *bench.node.controller().fault();
+        assert_eq!(
+            fault.to_string(),
+            "drive fault: drive status ready torque-on encoder-valid, not brake-released"
+        );
+        bench.run(100);
+        assert_eq!(bench.mode(), Mode::Fault);
+        assert!(is_off(&bench.command()));
+    }
+}
+
+/// A command that was lost on the way, or a brake that is slow.
+#[test]
+fn a_brake_that_opens_late_is_waited_for() {
+    let mut bench = Bench::asked_to_enable().0;
+    bench.opens = false;
+    bench.run(100);
+    assert_eq!(bench.mode(), Mode::Enabling);
+    bench.opens = true;
+    bench.run(2);
+    assert_eq!(
+        (bench.mode(), bench.node.controller().cause()),
+        (Mode::Enabled, Cause::None)
+    );
+}
+
+/// Before the axis shows that it is held.
+#[test]
+fn a_brake_that_closes_by_itself_is_told_at_once() {
+    for mut bench in [Bench::enabled(), Bench::moving()] {
+        bench.opens = false;
+        let command = bench.command();
+        assert_eq!(command.control, ControlWord::TORQUE_ENABLE);
+        assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
+    }
+}
+
+/// The first feedback says so: nobody can switch on before it is told, which takes the time of the brake, as it may be on its way.
+#[test]
+fn an_arm_whose_brake_is_open_is_not_ready() {
+    let mut bench = Bench::new();
+    bench.status = bench.status | DriveStatus::BRAKE_RELEASED;
+    bench.hello(table::HASH);
+    bench.run(50);
+    assert_eq!(bench.mode(), Mode::PreOperational);
+    bench.status = bench.status.with(DriveStatus::BRAKE_RELEASED, false);
+    bench.run(2);
+    assert_eq!(bench.mode(), Mode::Ready);
+    bench.status = bench.status | DriveStatus::BRAKE_RELEASED;
+    bench.step();
+    assert_eq!(
+        (bench.mode(), bench.node.controller().cause()),
+        (Mode::Fault, Cause::DriveFault)
+    );
+
+    let mut bench = Bench::new();
+    bench.status = bench.status | DriveStatus::BRAKE_RELEASED;
+    bench.hello(table::HASH);
+    for _ in 0..62 {
+        bench.step();
+        assert_ne!(bench.mode(), Mode::Ready);
+    }
+    assert_eq!(
+        (bench.mode(), bench.node.controller().cause()),
+        (Mode::Fault, Cause::DriveFault)
+    );
+}

@@ -104,6 +104,8 @@ struct Planted {
     stopped: Option<Instant>,
     off: Option<Instant>,
     was_powered: bool,
+    /// Whether it means the brake to be open.
+    releases: bool,
     done: bool,
 }
 
@@ -129,6 +131,7 @@ impl Planted {
             stopped: None,
             off: None,
             was_powered: false,
+            releases: false,
             done: false,
         }
     }
@@ -156,7 +159,9 @@ impl Planted {
                 ),
                 Ok(Message::Feedback(mut feedback)),
             ) => {
-                feedback.status = feedback.status.with(DriveStatus::BRAKE_RELEASED, false);
+                let is_open = feedback.status.contains(DriveStatus::BRAKE_RELEASED);
+                let is_seen = is_open && self.releases;
+                feedback.status = feedback.status.with(DriveStatus::BRAKE_RELEASED, is_seen);
                 Some(feedback)
             }
             (Some(Defect::Distracted), Ok(Message::Feedback(_)))
@@ -204,6 +209,7 @@ impl Planted {
         let (torque, brake) = (ControlWord::TORQUE_ENABLE, ControlWord::BRAKE_RELEASE);
         let sound = command.control;
         self.was_powered |= sound.contains(torque);
+        self.releases = sound.contains(brake);
         if self.was_powered && sound.contains(ControlWord::QUICK_STOP) {
             self.stopped.get_or_insert(time);
         }

@@ -11,6 +11,7 @@
 #[path = "common/record.rs"]
 mod record;
 
+use protocol::messages::Mode;
 use record::{Record, run_of};
 use sim::scenario::Scenario;
 use sim::summary::Summary;
@@ -112,7 +113,35 @@ fn a_lift_at_rest_stays_where_it_is_when_the_arm_fails() {
 #[test]
 fn a_brake_that_does_not_close_is_told_whatever_was_told_before() {
     let scenario = Scenario::built_in("estop-descent").unwrap();
-    let (summary, _) = run_of(scenario, &["brake:stuck-open@0s"], 5);
+    let (summary, _) = run_of(scenario, &["brake:stuck-open@0.3s"], 5);
     let causes: Vec<_> = summary.faults.iter().map(|fault| fault.cause).collect();
     assert_eq!(causes, ["estop", "drive-fault"]);
+}
+
+/// The brake is where the drives say, and that is not where it is to be: told as such, and not as what the lift makes of it.
+#[test]
+fn the_drives_word_of_the_brake_comes_first() {
+    for (fault, by) in [
+        // Told to open once ready, and waited for twice as long as it may take.
+        ("brake:stuck-closed@0s", 0.2),
+        ("brake:stuck@0s", 0.2),
+        // Open from the first sample on, at rest.
+        ("brake:stuck-open@0s", 0.1),
+        // While it moves: with the next sample.
+        ("brake:stuck-closed@0.4s", 0.402),
+        ("brake:stuck-closed@while=lift-down", 1.0),
+    ] {
+        let (summary, record) = with_22_kg(&[fault]);
+        assert!(!summary.completed, "{fault}");
+        let told = &summary.faults[0];
+        assert_eq!(told.cause, "drive-fault", "{fault}");
+        assert!(told.time_s < by, "{fault}: {}", told.time_s);
+        if by < 0.4 {
+            let enabled = |it: &sim::observer::Truth| it.mind.mode == Mode::Enabled;
+            assert!(!record.truths.iter().any(enabled), "{fault}");
+        }
+    }
+    // One that takes 50 ms longer is waited for.
+    let (summary, _) = with_22_kg(&["brake:slow=0.05@0s..0.2s"]);
+    assert!(summary.completed, "{:?}", summary.error);
 }

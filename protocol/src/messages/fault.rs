@@ -131,6 +131,14 @@ impl Unit {
         }
     }
 
+    /// What leads from a value to its limit: of a status, to what is missing in it.
+    const fn before_limit(self) -> &'static str {
+        match self {
+            Self::DriveStatus => ", not",
+            _ => ", limit ",
+        }
+    }
+
     fn show(self, value: f32, digits: usize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::None => Ok(()),
@@ -139,7 +147,6 @@ impl Unit {
                 write!(f, "{value:.digits$} {} in a row", self.symbol())
             }
             Self::DriveStatus => {
-                f.write_str("drive status")?;
                 let mut bits = value as u8;
                 for name in DriveStatus::NAMES {
                     if bits & 1 == 1 {
@@ -241,7 +248,11 @@ impl fmt::Display for Fault {
         }
         let unit = self.unit();
         if unit != Unit::None && self.value != 0.0 {
-            f.write_str(": ")?;
+            f.write_str(if unit == Unit::DriveStatus {
+                ": drive status"
+            } else {
+                ": "
+            })?;
             let (value, limit) = (unit.scaled(self.value), unit.scaled(self.limit));
             let mut digits = unit.digits();
             if limit != 0.0 {
@@ -249,7 +260,7 @@ impl fmt::Display for Fault {
             }
             unit.show(value, digits, f)?;
             if limit != 0.0 {
-                f.write_str(", limit ")?;
+                f.write_str(unit.before_limit())?;
                 unit.show(limit, digits, f)?;
             }
         }

@@ -64,7 +64,7 @@ impl Controller {
                 self.limp = false;
                 self.drives_on = false;
                 self.built_up = 0.0;
-                self.unheld = 0;
+                self.misplaced = 0;
                 self.unlearn();
                 self.monitor.reset();
             }
@@ -72,6 +72,9 @@ impl Controller {
                 self.withdraw();
                 // A violation has to recur before it escalates.
                 self.monitor.reset();
+                if let Halt::Closing(_) = halt {
+                    self.misplaced = 0;
+                }
                 if halt == Halt::Off {
                     self.queue.clear(&self.setpoint.reference.q);
                 }
@@ -111,6 +114,13 @@ impl Controller {
         let has_torque = self.expects_torque() && readings.steps <= self.max_gap;
         if let Some(fault) = Monitor::status(readings.status, has_torque) {
             self.fail(fault);
+        }
+        let is_to_be_open = matches!(
+            self.state,
+            State::Enabled | State::Moving | State::QuickStop
+        );
+        if is_to_be_open && !readings.status.contains(DriveStatus::BRAKE_RELEASED) {
+            self.fail(closed_brake(readings.status));
         }
         let error = self.setpoint.reference.q - q;
         if self.limp {
@@ -168,7 +178,8 @@ impl Controller {
     }
 
     /// Counts down the time of the brake. One that has not closed by then does not hold the lift: torque goes on holding it,
-    /// until the brake has closed or the drives are off.
+    /// until the brake has closed or the drives are off. One that has not opened has as much time again, since the command may have been
+    /// lost: nothing may move before.
     pub(super) fn wait(&mut self, readings: &Readings) {
         let (state, event) = self.state.wait(readings.steps);
         self.state = state;
@@ -176,21 +187,31 @@ impl Controller {
             return;
         };
         let status = readings.status;
-        if event == Event::BrakeClosed && status.contains(DriveStatus::BRAKE_RELEASED) {
-            let fault = open_brake(status);
-            self.fail(fault);
-            if self.unheld == 0 {
-                // Told once, also where it changes nothing.
-                self.unheld = 1;
-                self.alarm.get_or_insert(fault);
+        match (event, status.contains(DriveStatus::BRAKE_RELEASED)) {
+            (Event::BrakeOpen, false) => {
+                self.misplaced = self.misplaced.saturating_add(readings.steps);
+                if self.misplaced >= self.brake_samples() {
+                    self.fail(closed_brake(status));
+                }
             }
-        } else {
-            self.event(event);
+            (Event::BrakeClosed, true) => {
+                let fault = open_brake(status);
+                self.fail(fault);
+                if self.misplaced == 0 {
+                    // Told once, also where it changes nothing.
+                    self.misplaced = 1;
+                    self.alarm.get_or_insert(fault);
+                }
+            }
+            _ => {
+                self.misplaced = 0;
+                self.event(event);
+            }
         }
     }
 
-    /// Watches an arm without torque. Ready, it needs sound drives, and no encoder may jump. The brake alone holds it: one that does not close
-    /// in its time, or has opened by itself, is told once, and keeps the arm from being ready.
+    /// Watches an arm without torque. Ready, it needs sound drives, a closed brake, and no encoder may jump. The brake alone holds it: one
+    /// that does not close in its time is told once, and keeps the arm from being ready; one that opens by itself is told at once.
     pub(super) fn watch_at_rest(&mut self, readings: &Readings, q: &Vector4<f32>) {
         let status = readings.status;
         if self.state == State::Ready {
@@ -203,15 +224,29 @@ impl Controller {
             }
         }
         if !status.contains(DriveStatus::BRAKE_RELEASED) {
-            self.unheld = 0;
+            self.misplaced = 0;
             return;
         }
-        let before = self.unheld;
-        self.unheld = before.saturating_add(readings.steps);
-        let limit = self.brake_samples();
-        if self.unheld >= limit && (before < limit || self.state == State::Ready) {
+        let was_told = self.is_unheld();
+        let was_closed = self.state == State::Ready;
+        self.misplaced = if was_closed {
+            u32::MAX
+        } else {
+            self.misplaced.saturating_add(readings.steps)
+        };
+        if self.is_unheld() && (was_closed || !was_told) {
             self.fail(open_brake(status));
         }
+    }
+
+    /// Whether the brake, by this status, is where it has to be for an arm that is ready, or has had its time and the arm gets ready to tell it.
+    pub fn may_be_ready(&self, status: DriveStatus) -> bool {
+        !status.contains(DriveStatus::BRAKE_RELEASED) || self.is_unheld()
+    }
+
+    /// Whether an arm without torque has been without its brake for longer than that takes to close.
+    fn is_unheld(&self) -> bool {
+        self.misplaced >= self.brake_samples()
     }
 
     /// Time of the brake, samples.
@@ -229,6 +264,16 @@ impl Controller {
 /// The fault of a brake that is open where it should hold, with what the drives say.
 fn open_brake(status: DriveStatus) -> Fault {
     Fault::value(Cause::DriveFault, f32::from(status.bits()), 0.0)
+}
+
+/// The fault of a brake that is closed where the lift is to move: with what the drives say, and what they do not.
+fn closed_brake(status: DriveStatus) -> Fault {
+    let missing = DriveStatus::BRAKE_RELEASED.bits();
+    Fault::value(
+        Cause::DriveFault,
+        f32::from(status.bits()),
+        f32::from(missing),
+    )
 }
 
 /// Whether a fault concerns an axis of the arm, and not the shaft that the brake holds.

@@ -11,7 +11,7 @@ use super::spells::Spell;
 use crate::bus::ErrorKind;
 use crate::clock::ClockDefect;
 use crate::faults::{Disguise, FrameFault, What};
-use crate::plant::defect::{BrakeDefect, EncoderDefect, LoadDefect, MotorDefect};
+use crate::plant::defect::{EncoderDefect, LoadDefect, MotorDefect};
 
 /// No feedback comes. The drives have let go by the time at which they are heard again, but the gap is what is felt first.
 const GAP: &[Cause] = &[Cause::FeedbackLost, Cause::PeerSilent];
@@ -131,18 +131,8 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
         What::Encoder(..) => LIE,
         What::Motor(_, MotorDefect::Dip) => LET_GO,
         What::Motor(..) => FORCE,
-        What::Brake(BrakeDefect::StuckOpen | BrakeDefect::Slow(_)) => &[Cause::DriveFault],
-        What::Brake(BrakeDefect::StuckClosed) => FORCE,
-        What::Brake(BrakeDefect::Stuck) => {
-            // Closed, it is felt when the arm is to move.
-            &[
-                Cause::DriveFault,
-                Cause::Collision,
-                Cause::StuckSensor,
-                Cause::FollowingError,
-                Cause::OverTorque,
-            ]
-        }
+        // The drives see where it is before any axis does.
+        What::Brake(_) => &[Cause::DriveFault],
         What::Load(LoadDefect::Dropped | LoadDefect::Heavier(_) | LoadDefect::Caught(_)) => LOAD,
     })
 }

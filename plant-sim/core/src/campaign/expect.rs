@@ -31,7 +31,7 @@
 //!
 //! Whatever else breaks has no limit of time of its own, because a sound system may survive it: an encoder that is stuck, slow, reversed or lacks
 //! a bit lies only as far as its axis moves; a motor that is dead or weak is missed only where torque is needed, and the plan slows down for what
-//! it lacks; a load within the margins of the model is carried; a brake is missed when it is to close; what a foreign node sends without the
+//! it lacks; a load within the margins of the model is carried; a brake is told where it does not go where it is told to, or leaves that place; what a foreign node sends without the
 //! right CRC is dropped. Their limit is that of the effect, which is stricter: the controller closes its loops on the readings, so that an axis whose
 //! reading or torque is wrong leaves its reference in truth, and 4 samples later that has to be reported (see [`super::bounds`]). What is
 //! reported has to be a cause that they can have, and a run that ends early must not end untold (see `causes`).
