@@ -14,6 +14,8 @@ use crate::mechanics::math::{hypot, sin_cos, sqrt};
 pub const LIMIT: f32 = 0.25;
 /// What a move may use of it, m/s; the rest is for the error of following it.
 pub const PLANNED: f32 = 0.9 * LIMIT;
+/// Least control rate at which what is left is enough, Hz: slower loops overshoot by more than a tenth.
+pub const LEAST_RATE: f32 = 250.0;
 /// What each part of a jump may use of that: its strokes and its travel overlap.
 pub(super) const OF_A_PART: f32 = core::f32::consts::FRAC_1_SQRT_2;
 /// How far from the axis of the flange a point of the tool may be, m.

@@ -111,6 +111,7 @@ fn parameter(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str>
             Reason::OutOfRange,
         ) if refusal.value == *tool_speed && refusal.limit < 1.0 => "tool_speed",
         (_, Reason::OutOfRange) if request.is_move() => "speed",
+        (MotionRequest::SetOperation { .. }, Reason::OutOfRange) => "rate of control",
         (
             MotionRequest::MoveArc { .. },
             Reason::TooFar | Reason::TooNear | Reason::JointLimit | Reason::Singular,
@@ -153,6 +154,7 @@ fn unit(request: &MotionRequest, refusal: &Refusal) -> Option<&'static str> {
         (_, Reason::Singular) => "(sine of the elbow)",
         (MotionRequest::Jump { .. }, Reason::OutOfRange) if refusal.limit == 0.0 => "m",
         (_, Reason::OutOfRange) if parameter(request, refusal) == Some("tool_speed") => "m/s",
+        (MotionRequest::SetOperation { .. }, Reason::OutOfRange) => "Hz",
         (_, Reason::OutOfRange) => "",
         _ => return None,
     })

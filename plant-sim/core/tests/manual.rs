@@ -20,7 +20,9 @@ use protocol::messages::{Cause, Law, Message, Mode, MotionRequest, Operation};
 use record::{Record, run_of};
 use sim::observer::PlantState;
 use sim::plant::kinematics::wrap;
-use sim::scenario::{OperationName, Scenario};
+use sim::run::in_process;
+use sim::scenario::{OperationName, PayloadSpec, Scenario};
+use sim::setup::RunConfig;
 
 /// m/s of ISO 10218-1, at every point within so many m of the axis of the flange.
 const LIMIT: f64 = 0.25;
@@ -131,6 +133,45 @@ fn the_true_tool_stays_slow_and_stands_where_nobody_holds_it() {
         fast += u32::from(fastest > 0.5 * LIMIT);
     }
     assert!(stood > 1000 && fast > 8, "{stood} {fast}");
+}
+
+/// At the lowest rates the loop overshoots: manual operation is refused there, and nowhere from the first rate on at which it is not.
+#[test]
+fn the_tool_stays_slow_at_every_rate_that_is_taken() {
+    let rates = [
+        100.0, 120.0, 175.0, 200.0, 249.0, 250.0, 251.3, 270.0, 300.0, 333.0, 400.0, 700.0, 1000.0,
+        2500.0,
+    ];
+    for rate in rates {
+        for (name, payload) in [("gate", 0.0), ("gate", 22.0), ("arc", 0.0), ("square", 2.0)] {
+            let mut scenario = Scenario::built_in(name).unwrap();
+            scenario.cycles = 1;
+            scenario.payload = (payload > 0.0).then(|| PayloadSpec::compact(payload));
+            scenario.operation = OperationName::Manual;
+            scenario.rate_hz = rate;
+            let checked = Scenario::parse(&scenario.to_toml(), "a test");
+            if rate < 250.0 {
+                let error = checked.unwrap_err().to_string();
+                for word in ["rate_hz is", "250 Hz", "manual"] {
+                    assert!(error.contains(word), "{rate}: {error}");
+                }
+                // A controller asked behind the check's back refuses as well.
+                let run = in_process(&RunConfig::new(scenario), &mut ());
+                let error = run.map_or_else(|error| error.to_string(), |it| it.error.unwrap());
+                assert!(error.contains("limit 250 Hz"), "{rate}: {error}");
+                break;
+            }
+            let (summary, record) = run_of(checked.unwrap(), &[], 0);
+            assert!(summary.completed, "{name}, {rate}: {:?}", summary.error);
+            let pairs = record.truths.windows(2);
+            let speeds = pairs.map(|pair| speed(&pair[0].plant, &pair[1].plant));
+            let fastest = speeds.fold(0.0, f64::max);
+            assert!(
+                (0.2..LIMIT).contains(&fastest),
+                "{name}, {payload} kg, {rate} Hz: {fastest}"
+            );
+        }
+    }
 }
 
 /// The state says how the arm is operated, and that it waits.

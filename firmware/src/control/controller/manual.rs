@@ -16,13 +16,20 @@ impl Controller {
         self.operation
     }
 
-    /// Operates the arm like this from now on. Nothing moves, and nothing is about to.
-    pub(super) fn operate_as(&mut self, operation: Operation) {
+    /// Operates the arm like this from now on. Nothing moves, and nothing is about to. Where the loop is too slow to keep the tool so,
+    /// there is no manual operation.
+    pub(super) fn operate_as(&mut self, operation: Operation) -> Result<Answer, Refusal> {
+        let is_manual = operation == Operation::Manual;
+        let (rate, least) = (1.0 / self.period, tool_speed::LEAST_RATE);
+        // Periods are rounded.
+        if is_manual && rate < least - 0.01 {
+            return Err(Refusal::value(RefusalReason::OutOfRange, rate, least));
+        }
         self.operation = operation;
         self.held = 0;
         self.too_fast = 0;
-        let is_manual = operation == Operation::Manual;
         self.queue.set_held(is_manual.then_some(false));
+        Ok(Answer::Now)
     }
 
     /// Lets moves go on for another hold time.

@@ -95,10 +95,7 @@ impl Controller {
             }
             MotionRequest::Hold => self.hold()?,
             _ if !self.is_idle() => return Err(Refusal::because(RefusalReason::Moving)),
-            MotionRequest::SetOperation { operation } => {
-                self.operate_as(*operation);
-                Answer::Now
-            }
+            MotionRequest::SetOperation { operation } => self.operate_as(*operation)?,
             MotionRequest::SetPayload { mass, com, inertia } => {
                 let payload = Payload {
                     mass: *mass,

@@ -1,7 +1,10 @@
 //! What manual operation asks of a scenario.
 
+use firmware::trajectory::tool_speed::LEAST_RATE;
+
 use super::Findings;
 use crate::scenario::{Release, Step};
+use crate::text;
 
 impl Findings<'_> {
     /// Moves are let go of only where they are held, and held only under a law that keeps the tool as slow as planned.
@@ -18,7 +21,17 @@ impl Findings<'_> {
                     );
                 }
             }
-        } else if !scenario.law.law.takes_compensation() {
+            return;
+        }
+        // What a controller refuses.
+        let least = f64::from(LEAST_RATE);
+        if scenario.rate_hz < least {
+            let allowed = format!(
+                "{least} Hz and more with operation = \"manual\": a slower loop overshoots, and the tool would pass 250 mm/s"
+            );
+            self.wrong("rate_hz", text::number(scenario.rate_hz), allowed);
+        }
+        if !scenario.law.law.takes_compensation() {
             // Planned are nine tenths of 250 mm/s. Over 48 draws of moves, rates, payloads and mismatches (tests/manual.rs) the laws with a
             // model of the arm stay at that; pd-gravity reaches 238 mm/s, the kinematic ones 282 and pid 313.
             self.wrong(
