@@ -119,7 +119,7 @@ impl Planted {
             Some(Defect::OneBadFrameStops) => setup.bad_frames = 1,
             Some(Defect::NoGapBridged) => setup.monitor.gap = 0.001,
             Some(Defect::SpeedLimitTooLow) => setup.monitor.speed_factor = 0.2,
-            Some(Defect::NoWaitForTheBrake) => setup.brake_delay = 0.0,
+            Some(Defect::NoWaitForTheBrake) => setup.brake_delay = 0.001,
             _ => {}
         }
         Self {
@@ -159,9 +159,8 @@ impl Planted {
                 ),
                 Ok(Message::Feedback(mut feedback)),
             ) => {
-                let is_open = feedback.status.contains(DriveStatus::BRAKE_RELEASED);
-                let is_seen = is_open && self.releases;
-                feedback.status = feedback.status.with(DriveStatus::BRAKE_RELEASED, is_seen);
+                let released = DriveStatus::BRAKE_RELEASED;
+                feedback.status = feedback.status.with(released, self.releases);
                 Some(feedback)
             }
             (Some(Defect::Distracted), Ok(Message::Feedback(_)))

@@ -71,6 +71,26 @@ fn faults(random: &mut Rand64) -> Vec<Fault> {
     faults
 }
 
+/// The run takes less than a second, and has two jumps.
+#[test]
+fn a_fault_that_never_begins_shows_nothing() {
+    for (faults, never) in [
+        (vec![], false),
+        (vec!["drives:silent@5s"], true),
+        (vec!["drives:silent@jump9"], true),
+        (vec!["drives:silent@jump2"], false),
+        (vec!["drives:silent@jump9", "drives:silent@jump2"], false),
+    ] {
+        let mut scenario = Scenario::built_in("gate").unwrap();
+        scenario.cycles = 1;
+        scenario.faults = faults.iter().map(|text| text.parse().unwrap()).collect();
+        let connect = |config| Ok(InProcess::new(config));
+        let (verdict, ..) = trial::run(&RunConfig::new(scenario), connect, &mut ()).unwrap();
+        assert_eq!(verdict.never_began, never, "{faults:?}: {verdict:?}");
+        assert!(verdict.missed.is_empty(), "{faults:?}: {verdict:?}");
+    }
+}
+
 #[test]
 fn a_case_is_the_same_with_the_prelude_of_others() {
     let mut random = Rand64::new(1);

@@ -97,6 +97,7 @@ mod tests {
                 verdict: Verdict {
                     missed: BTreeSet::new(),
                     survived: distance_mm.is_none(),
+                    never_began: false,
                     detected: None,
                     detection_ms: None,
                     standstill_ms: distance_mm,

@@ -13,6 +13,7 @@
 //! | after standstill nothing moves by a tenth of a millimetre | what stands, stands |
 
 use nalgebra::Vector4;
+use protocol::messages::{Command, ControlWord};
 use protocol::time::Duration;
 
 use crate::model::{Payload, RobotModel};
@@ -78,9 +79,14 @@ impl Bounds {
         self.payload = payload.mass;
     }
 
-    /// Whether the motors may be asked for these torques, N m: for none while torque is not enabled.
-    pub fn allows_torque(&self, torque: &[f32; 4], is_enabled: bool) -> bool {
-        if !is_enabled {
+    /// Whether the motors may be asked for the torques of this command: for none while torque is not enabled.
+    pub fn allows_torque(
+        &self,
+        Command {
+            control, torque, ..
+        }: &Command,
+    ) -> bool {
+        if !control.contains(ControlWord::TORQUE_ENABLE) {
             return *torque == [0.0; 4];
         }
         let limits = self.model.drive.motor_torque_limit;

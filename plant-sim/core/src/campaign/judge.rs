@@ -144,9 +144,8 @@ impl Judge {
         if self.reports.latched().is_some() && !is_faulty(self.mode) {
             self.miss(Requirement::Latch);
         }
-        let is_early = self
-            .first()
-            .is_some_and(|at| at < self.faults.onset().seconds());
+        let onset = self.faults.onset().seconds();
+        let is_early = self.first().is_some_and(|at| at < onset);
         if (is_early && !self.survived) || !self.faults.expected().allows(self.survived, told) {
             self.miss(Requirement::NoFalseAlarm);
         }
@@ -178,6 +177,7 @@ impl Judge {
         let at = self.first().filter(|at| *at >= onset);
         Verdict {
             survived: self.survived,
+            never_began: self.faults.begin_after(self.rest),
             detected: match told {
                 Some(cause) => Some(cause.name().into()),
                 None => self.cut.map(|_| "drives".into()),
@@ -210,8 +210,7 @@ impl Judge {
     /// The controller has commanded the drives.
     fn commanded(&mut self, time: Instant, command: &Command) {
         let control = command.control;
-        let is_enabled = control.contains(ControlWord::TORQUE_ENABLE);
-        if !self.bounds.allows_torque(&command.torque, is_enabled) {
+        if !self.bounds.allows_torque(command) {
             self.miss(Requirement::Torque);
         }
         let Some(before) = self.newest.take(time, command) else {

@@ -8,6 +8,7 @@ use super::expect::{Expected, expected, lateness};
 use super::verdict::Requirement;
 use crate::faults::{Fault, What};
 use crate::model::Payload;
+use crate::observer::PlantState;
 use crate::plant::defect::{BrakeDefect, LoadDefect, burdened};
 
 /// What breaks, and when: at the end of time as long as that is not known.
@@ -67,6 +68,11 @@ impl Spells {
     /// Beginning of the first; the end of time without one.
     pub(super) fn onset(&self) -> Instant {
         self.onset
+    }
+
+    /// Whether there are some, and none of them has begun at this end of the run.
+    pub(super) fn begin_after(&self, end: Option<PlantState>) -> bool {
+        !self.all.is_empty() && end.is_some_and(|end| self.onset.seconds() > end.t)
     }
 
     /// What has to follow.

@@ -26,6 +26,8 @@ pub struct Tally {
     rows: BTreeMap<(String, String), Row>,
     /// Missed cases by kind of fault and requirement, and the first of them.
     misses: BTreeMap<(String, Requirement), (u64, u64)>,
+    /// The first case of which no fault began.
+    first_void: Option<u64>,
 }
 
 /// Counts and worst cases of a kind of fault in a situation.
@@ -33,6 +35,7 @@ pub struct Tally {
 struct Row {
     cases: u64,
     missed: u64,
+    never_began: u64,
     survived: u64,
     detection_ms: Greatest,
     standstill_ms: Greatest,
@@ -75,6 +78,7 @@ impl Row {
     fn add(&mut self, verdict: &Verdict) {
         self.cases += 1;
         self.missed += u64::from(!verdict.missed.is_empty());
+        self.never_began += u64::from(is_void(verdict));
         self.survived += u64::from(verdict.survived);
         self.detection_ms.add(verdict.detection_ms);
         self.standstill_ms.add(verdict.standstill_ms);
@@ -94,6 +98,12 @@ impl Tally {
             let (count, first) = miss.or_insert((0, case.case));
             *count += 1;
             *first = case.case.min(*first);
+        }
+        if is_void(verdict) {
+            let first = self
+                .first_void
+                .map_or(case.case, |first| first.min(case.case));
+            self.first_void = Some(first);
         }
         self.all.add(verdict);
         let row = self.rows.entry((kinds, case.situation.clone()));
@@ -128,6 +138,11 @@ impl Tally {
     }
 }
 
+/// Whether a case shows nothing of its faults, nor of anything else.
+fn is_void(verdict: &Verdict) -> bool {
+    verdict.never_began && verdict.missed.is_empty()
+}
+
 /// The report, as Markdown.
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -150,14 +165,27 @@ impl fmt::Display for Tally {
                 row.drop_mm
             )?;
         }
-        let Row { cases, missed, .. } = self.all;
-        let bound = miss_rate_bound(cases, missed) * 100.0;
+        let Row {
+            cases,
+            missed,
+            never_began,
+            ..
+        } = self.all;
+        let judged = cases - never_began;
+        // A bound is not rounded down.
+        let bound = (miss_rate_bound(judged, missed) * 1e5).ceil() / 1e3;
         writeln!(
             f,
             "\n{cases} cases: {} held, {missed} missed a requirement; with a confidence of 95 % fewer than {bound:.3} % do \
              (Clopper-Pearson)",
-            cases - missed
+            judged - missed
         )?;
+        if let Some(first) = self.first_void {
+            writeln!(
+                f,
+                "\n{never_began} of them are not counted: their runs ended before any of their faults began, the first of them case {first}"
+            )?;
+        }
         if self.misses.is_empty() {
             return Ok(());
         }
@@ -231,6 +259,38 @@ mod tests {
         }
         assert_eq!(miss_rate_bound(5, 5), 1.0);
         assert_eq!(miss_rate_bound(0, 0), 1.0);
+    }
+
+    fn outcome(case: u64, never_began: bool) -> Outcome {
+        let case = format!(
+            r#"{{"case": {case}, "situation": "a", "faults": ["drives:silent@9s"], "seed": 0}}"#
+        );
+        let verdict = format!(
+            r#"{{"missed": [], "survived": true, "never_began": {never_began}, "detected": null, "detection_ms": null,
+            "standstill_ms": null, "distance_mm": null, "energy_j": null, "drop_mm": null}}"#
+        );
+        Outcome {
+            case: serde_json::from_str(&case).unwrap(),
+            verdict: serde_json::from_str(&verdict).unwrap(),
+        }
+    }
+
+    /// Of 59 cases without a miss the bound is 1 - 0.05^(1/59), 4.9508 %: those in which nothing broke are none of them.
+    #[test]
+    fn a_case_in_which_nothing_broke_is_not_held() {
+        let mut tally = Tally::default();
+        for case in 0..70 {
+            tally.add(&outcome(case, case >= 59));
+        }
+        let text = tally.to_string();
+        for part in [
+            "70 cases: 59 held, 0 missed",
+            "fewer than 4.951 % do",
+            "11 of them are not counted",
+            "the first of them case 59",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
     }
 
     /// Five of a hundred, from the sum of binomials with exact coefficients.

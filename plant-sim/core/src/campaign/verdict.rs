@@ -64,6 +64,9 @@ pub struct Verdict {
     pub missed: BTreeSet<Requirement>,
     /// Whether the scenario ran to its end in spite of the fault.
     pub survived: bool,
+    /// Whether none of its faults had begun when the run ended: it shows nothing of them, and counts neither as held nor as missed.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub never_began: bool,
     /// What stopped it: a cause that the controller reported, or `drives` where they switched off by themselves.
     pub detected: Option<String>,
     /// From the beginning of the fault until it was detected, ms; of a false alarm before it there is none.
