@@ -80,7 +80,16 @@ pub fn load(file: Option<&Path>) -> Result<Crossing, CampaignError> {
 
 fn crossing(text: &str) -> Result<Crossing, String> {
     let cases: Cases = toml::from_str(text).map_err(|error| error.to_string())?;
-    let lasts = cases.lasts_ms.iter().map(|ms| micros("lasts_ms", *ms));
+    let lasts = cases
+        .lasts_ms
+        .iter()
+        .map(|ms| match micros("lasts_ms", *ms) {
+            // It would stay for ever.
+            Ok(0) if *ms != 0.0 => Err(format!(
+                "lasts_ms is {ms}; allowed: 0, for a fault that stays, and 0.001 to 1000000 ms"
+            )),
+            lasts => lasts,
+        });
     let lasts = lasts.collect::<Result<_, _>>()?;
     let situations = cases.situation.iter().map(situation);
     let situations: Vec<Situation> = situations.collect::<Result<_, _>>()?;
@@ -182,6 +191,11 @@ mod tests {
             ("step = 0.7", "step = 0", "begin_ms.step is 0"),
             ("from = 250", "from = 2500", "is before begin_ms.from"),
             ("lasts_ms = [2,", "lasts_ms = [-2,", "lasts_ms is -2"),
+            (
+                "lasts_ms = [2,",
+                "lasts_ms = [0.0001,",
+                "allowed: 0, for a fault that stays",
+            ),
             ("motor:lift:dead", "motor:lift:ded", "did you mean dead?"),
             ("gate, 22 kg", "gate, 2 kg", "the same name"),
             ("payload = 22", "payload = -22", "payload"),
