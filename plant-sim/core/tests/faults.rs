@@ -276,6 +276,8 @@ fn what_is_not_a_fault_is_refused_with_what_is_allowed() {
         ("drives:slow=0.1@0.3s", "allowed: controller:slow"),
         ("command:loss=2@0.3s", "loss is 2; allowed: 0 to 1"),
         ("command:duplicate=2@0.3s", "duplicate takes no value"),
+        ("estop:forged@0.3s", "nothing to repeat of EStop; allowed: "),
+        ("nmt:forged@0.3s", "nothing to repeat of Nmt; allowed: "),
         ("command:loss:1@0.3s", "is too much"),
         ("", "there is no time"),
     ] {

@@ -1,10 +1,11 @@
 //! The kinds of faults: a row for each, as people write it and read about it.
 
-use protocol::schema::MessageInfo;
+use protocol::schema::{Content, MessageInfo};
 
 use super::frames::real_number;
 
 const BAD_VALUE: &str = "bad-value";
+const FORGED: &str = "forged";
 
 /// A kind of fault, as people write it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +27,21 @@ pub struct Kind {
 impl Kind {
     /// Whether this kind, of a message, can act on that one.
     pub fn acts_on(&self, info: &MessageInfo) -> bool {
-        self.name != BAD_VALUE || real_number(info).is_some()
+        self.why_not(info).is_none()
+    }
+
+    /// Why it cannot, as in "... of the message NAME".
+    pub(super) fn why_not(&self, info: &MessageInfo) -> Option<&'static str> {
+        match self.name {
+            BAD_VALUE if real_number(info).is_none() => {
+                Some("there is not always a real number in")
+            }
+            // An emergency stop is sent once, where there is nothing left to stop.
+            FORGED if matches!(info.content, Content::Nmt | Content::EStop) => {
+                Some("a run has nothing to repeat of")
+            }
+            _ => None,
+        }
     }
 }
 
@@ -144,7 +159,7 @@ pub const KINDS: [Kind; 43] = [
     of_message("replay", Some(Value { default: Some(1.0), ..whole(1.0, 64.0, "frames") }),
         "the frame is the one sent so many frames before"),
     of_message("masquerade", None, "a foreign node sends the message once a sample, without its end-to-end protection"),
-    of_message("forged", None, "a foreign node sends the last frame of the message once a sample, with the next counter and the right CRC"),
+    of_message(FORGED, None, "a foreign node sends the last frame of the message once a sample, with the next counter and the right CRC"),
     of_message("bit-error", Some(ATTEMPTS), "the node that sends reads another bit than its own"),
     of_message("stuff-error", Some(ATTEMPTS), "all nodes read six equal bits in a row"),
     of_message("form-error", Some(ATTEMPTS), "a delimiter or the end of the frame has a dominant bit"),

@@ -89,13 +89,11 @@ fn what_of(text: &str) -> Result<What, String> {
     let value = number(kind.name, kind.value, value)?;
     let second = number(kind.name, kind.second, second)?;
     if let (Some(info), None) = (message, node) {
-        if !kind.acts_on(info) {
+        if let Some(why) = kind.why_not(info) {
             let with = TABLE.iter().filter(|info| kind.acts_on(info));
             let names: Vec<_> = with.map(|info| info.name).collect();
             let (name, names) = (info.name, names.join(", "));
-            return Err(format!(
-                "not every {name} has a real number in it; allowed: {names}"
-            ));
+            return Err(format!("{why} {name}; allowed: {names}"));
         }
         return Ok(of_message(info, kind.name, value, second));
     }
