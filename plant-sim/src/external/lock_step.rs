@@ -5,8 +5,9 @@ use std::time;
 use firmware::control::controller::Config;
 use link::LinkAddress;
 use protocol::bus::Bus as _;
+use protocol::codec;
 use protocol::frame::CanFrame;
-use protocol::messages::Node as Name;
+use protocol::messages::{Cause, Message, Node as Name};
 use protocol::table;
 use protocol::time::Instant;
 use sim::controller::COMPUTE;
@@ -93,6 +94,13 @@ impl LockStep {
         self.remote.refuse_restart(frame, self.twin.node())?;
         if self.follows {
             self.twin.compare(frame).map_err(|difference| {
+                if misses_a_peer(frame) {
+                    return self.remote.error(format!(
+                        "has missed the plant {}, and says peer-silent: this process has stood still meanwhile, stopped or on a \
+                         computer with too much to do, and the time of a controller in another one goes on",
+                        self.place()
+                    ));
+                }
                 self.remote.error(format!(
                     "differs from its twin in this process {}: {difference}. Both must be built from the same source and \
                      have the same robot (--model) and rate (--rate); a controller in real time needs a plant in real \
@@ -174,5 +182,45 @@ impl Peer for LockStep {
         out.extend(self.sent.drain(..).map(|frame| (now + COMPUTE, frame)));
         world.mind = self.twin.controller().mind();
         Ok(())
+    }
+}
+
+/// Whether a controller says in this frame that it has not heard the drives for too long.
+fn misses_a_peer(frame: &CanFrame) -> bool {
+    let cause = match codec::decode(frame).map(|received| received.message) {
+        Ok(Message::Emergency(_, emergency)) => emergency.cause,
+        Ok(Message::Heartbeat(_, heartbeat)) => heartbeat.cause,
+        Ok(Message::State(state)) => state.cause,
+        _ => return false,
+    };
+    cause == Cause::PeerSilent
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::messages::{Emergency, Heartbeat, Mode, ResetReason};
+
+    use super::*;
+
+    /// A plant that has stood still is not told as one of another source.
+    #[test]
+    fn a_controller_that_missed_the_plant_says_so() {
+        let heartbeat = |cause| {
+            let heartbeat = Heartbeat {
+                state: Mode::Fault,
+                cause,
+                reset: ResetReason::PowerOn,
+            };
+            Message::Heartbeat(Name::Controller, heartbeat)
+        };
+        let emergency = Emergency::new(Cause::PeerSilent, 0);
+        for (message, expected) in [
+            (heartbeat(Cause::PeerSilent), true),
+            (Message::Emergency(Name::Controller, emergency), true),
+            (heartbeat(Cause::Chatter), false),
+        ] {
+            let frame = codec::encode(&message, 0).unwrap();
+            assert_eq!(misses_a_peer(&frame), expected, "{message:?}");
+        }
     }
 }
