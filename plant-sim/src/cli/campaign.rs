@@ -100,7 +100,13 @@ pub(super) struct CaseArgs {
     /// The plan.
     plan: PathBuf,
     /// Number of the case.
+    #[arg(value_parser = number_of_case)]
     case: u64,
+}
+
+fn number_of_case(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| "allowed: a whole number from 0, as in the plan and the results".into())
 }
 
 /// Arguments of `replay`.
