@@ -76,6 +76,14 @@ fn a_fault_reads_as_a_sentence_with_axis_and_unit() {
             "drive fault: drive status ready fault",
         ),
         (
+            Fault::value(
+                Cause::DriveFault,
+                f32::from(status.bits()),
+                f32::from((DriveStatus::BRAKE_RELEASED | DriveStatus::TORQUE_ON).bits()),
+            ),
+            "drive fault: drive status ready fault, not torque-on brake-released",
+        ),
+        (
             Fault::value(Cause::FeedbackLost, 6.0, 5.0),
             "feedback lost: 6.0 ms, limit 5.0 ms",
         ),
@@ -103,6 +111,8 @@ fn an_emergency_keeps_the_value() {
         emergency.fault().to_string(),
         "following error: 0.0021 rad or m"
     );
+    let jump = Emergency::new(Cause::EncoderFault, (-0.0126f32).to_bits());
+    assert_eq!(jump.fault().to_string(), "encoder fault: -0.0126 rad or m");
     let nonsense = Emergency::new(Cause::OverSpeed, f32::NAN.to_bits());
     assert_eq!(nonsense.value(), 0.0);
     assert_eq!(nonsense.fault().to_string(), "over speed");

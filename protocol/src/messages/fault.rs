@@ -166,6 +166,11 @@ impl Unit {
     }
 }
 
+/// Whether a number can be the bits of a [`DriveStatus`], and not a jump of an encoder whose axis an emergency does not tell.
+const fn is_status(value: f32) -> bool {
+    value != 0.0 && value == value as u8 as f32
+}
+
 /// `digits` after the point, or as many more, up to three, as it takes to tell the two numbers apart.
 fn telling_apart(a: f32, b: f32, digits: usize) -> usize {
     let differ = |digits: &usize| {
@@ -204,7 +209,8 @@ impl Fault {
         match (self.cause, self.axis) {
             (Cause::SelfTest, _) => Unit::KnownAnswer,
             (Cause::DuplicateNode, _) => Unit::Identifier,
-            (Cause::DriveFault, _) | (Cause::EncoderFault, None) => Unit::DriveStatus,
+            (Cause::DriveFault, _) => Unit::DriveStatus,
+            (Cause::EncoderFault, None) if is_status(self.value) => Unit::DriveStatus,
             (
                 Cause::FeedbackLost | Cause::PeerSilent | Cause::OperatorSilent | Cause::OverTorque,
                 _,
@@ -212,9 +218,10 @@ impl Fault {
             (Cause::Babbling | Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => {
                 Unit::Frame
             }
-            (Cause::FollowingError | Cause::SoftLimit | Cause::StuckSensor, None) => {
-                Unit::RadianOrMetre
-            }
+            (
+                Cause::FollowingError | Cause::SoftLimit | Cause::StuckSensor | Cause::EncoderFault,
+                None,
+            ) => Unit::RadianOrMetre,
             (
                 Cause::FollowingError | Cause::SoftLimit | Cause::StuckSensor | Cause::EncoderFault,
                 axis,
