@@ -140,3 +140,64 @@ fn torque_rates_between_borders_are_kept() {
         check(&IRB_930, &two_kg(), &trajectory).unwrap();
     }
 }
+
+/// Half a turn is as long by either way. To and fro the wrist stays within half a turn of its middle, 0, whatever rounding and encoders
+/// make of the half turn: by jumps, which turn the wrist the shorter way, and by lines and arcs, which turn the yaw.
+#[test]
+fn half_turns_do_not_wander() {
+    use std::f32::consts::PI;
+    let posture = Posture {
+        elbow: ElbowSide::Keep,
+        turn: WristTurn::Nearest,
+    };
+    let via = nalgebra::Vector3::new(0.65, 0.0, -0.25);
+    type Move<'a> = &'a dyn Fn(Pose) -> Target;
+    let line: Move<'_> = &|to| Target::Line(to, posture);
+    let arc: Move<'_> = &|to| Target::Arc(via, to, posture);
+    let jump: Move<'_> = &|pose| Target::Jump {
+        pose,
+        posture,
+        top: -0.2,
+        clearance: 0.0,
+    };
+    // A jump has a half turn of the wrist where shoulder and elbow end as they began.
+    for (target, y) in [(line, 0.2), (arc, 0.2), (jump, -0.2)] {
+        let place = |y, yaw| Pose {
+            x: 0.6,
+            y,
+            z: -0.25,
+            yaw,
+        };
+        let begin = |turn: f32| {
+            let mut q = kinematics::solve(
+                &IRB_930.geometry,
+                &place(-0.2, 0.0),
+                kinematics::Elbow::Positive,
+            )
+            .unwrap();
+            q.w += turn;
+            q
+        };
+        for start in [begin(0.0), begin(-2.0 * PI), begin(2.0 * PI)] {
+            let mut ends = [[0.0; 2]; 7];
+            for (off, ends) in [-9e-5, -1e-6, 0.0, 3e-7, 1e-6, 1e-5, 9e-5]
+                .into_iter()
+                .zip(&mut ends)
+            {
+                let mut from = start;
+                for turn in 0..8 {
+                    let [to, yaw] = [[y, PI + off], [-0.2, 0.0]][turn % 2];
+                    let moved = plan(&IRB_930, &two_kg(), &from, target(place(to, yaw)), 1.0);
+                    from = moved.unwrap().end;
+                    // From a turn further out the first one is on the way back.
+                    assert!(turn == 0 || from.w.abs() < PI + 1e-3, "{off}: {from:?}");
+                    ends[turn % 2] = from.w;
+                }
+            }
+            // Which way it goes does not depend on what is off.
+            let first = ends[0];
+            assert!(ends.iter().all(|end| (end[0] - first[0]).abs() < 1e-3));
+            assert!(ends.iter().all(|end| (end[1] - first[1]).abs() < 1e-3));
+        }
+    }
+}

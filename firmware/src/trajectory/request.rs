@@ -7,7 +7,7 @@ use super::Lift;
 use super::curve::{Curve, MIN_HEIGHT};
 use super::path::{MIN_SIN_ELBOW, Path, PathError};
 use crate::mechanics::arm::{ArmModel, Axis};
-use crate::mechanics::kinematics::{self, Elbow, IkError, Pose, Wrist};
+use crate::mechanics::kinematics::{self, Elbow, IkError, Pose, Wrist, shorter_way};
 use crate::mechanics::math::wrap;
 
 /// What to move to. Lengths in m in frame 0 (z up), angles in rad.
@@ -152,7 +152,11 @@ fn tool(
     let start = kinematics::forward(&arm.geometry, from);
     let yaw = |q: &Vector4<f32>| q.x + q.y - q.w;
     let turned = if posture.turn == WristTurn::Nearest {
-        wrap(to.yaw - yaw(from))
+        // Axis 4 makes up for what shoulder and elbow turn: half a turn of the yaw is either way as long.
+        let wrist = |turned: f32| end.x + end.y - yaw(from) - turned;
+        let turned = wrap(to.yaw - yaw(from));
+        let other = shorter_way(-turned, wrist(turned), &arm.limits);
+        turned + (wrist(turned) - other)
     } else {
         yaw(end) - yaw(from)
     };

@@ -1,6 +1,6 @@
 //! Inverse kinematics: the joint position for a pose of the flange.
 
-use core::f32::consts::TAU;
+use core::f32::consts::{PI, TAU};
 use core::fmt;
 
 use nalgebra::Vector4;
@@ -184,16 +184,39 @@ pub fn locate(
 ) -> Result<Vector4<f32>, IkError> {
     let mut q = solve(&arm.geometry, pose, elbow)?;
     q.w = match wrist {
-        Wrist::Near(near) => nearest_turn(q.w, near, arm.limits.lower.w, arm.limits.upper.w),
+        Wrist::Near(near) => nearest_turn(q.w, near, &arm.limits),
         Wrist::Turn(turn) => q.w + f32::from(turn) * TAU,
     };
     within_limits(&q, &arm.limits)
 }
 
+/// Turns of axis 4 that are less than this short of a half one count as half turns (rad): more than rounding and encoder counts make
+/// of one, less than anyone aims at.
+const HALF_TURN_TOLERANCE: f32 = 1e-4;
+
+/// The end of a turn of axis 4 by the shorter way, which ends at `end`. Either way is as long for a half turn, and the last digit must
+/// not decide: there it is the way that ends nearer to the middle of the range; the positive one if neither does.
+// Out of line: jumps, lines and arcs share it.
+#[inline(never)]
+pub(crate) fn shorter_way(turn: f32, end: f32, limits: &JointLimits) -> f32 {
+    if turn.abs() < PI - HALF_TURN_TOLERANCE {
+        return end;
+    }
+    let middle = 0.5 * (limits.lower.w + limits.upper.w);
+    let upper = if turn < 0.0 { end + TAU } else { end };
+    if upper - middle > PI + HALF_TURN_TOLERANCE {
+        upper - TAU
+    } else {
+        upper
+    }
+}
+
 /// The angle plus whole turns that is nearest to `near` inside the limits; outside them if no turn is inside.
-fn nearest_turn(angle: f32, near: f32, lower: f32, upper: f32) -> f32 {
+fn nearest_turn(angle: f32, near: f32, limits: &JointLimits) -> f32 {
+    let (lower, upper) = (limits.lower.w, limits.upper.w);
     let near = clamp(near, lower, upper);
-    let nearest = near + wrap(angle - near);
+    let turn = wrap(angle - near);
+    let nearest = shorter_way(turn, near + turn, limits);
     let slack = LIMIT_TOLERANCE * (upper - lower);
     if nearest > upper + slack {
         nearest - TAU

@@ -104,7 +104,8 @@ pub struct Jump {
     /// Side to which the elbow bends at the end; as before the move if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elbow: Option<Elbow>,
-    /// Turn of the wrist at the end: whole revolutions of theta4, 0 from -pi to pi; the nearest if left out.
+    /// Turn of the wrist at the end: whole revolutions of theta4, 0 from -pi to pi; the nearest if left out, after half a turn that
+    /// nearer to the middle of its range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -WristTurn::MOST, max = WristTurn::MOST))]
     pub turn: Option<i8>,
@@ -137,7 +138,7 @@ pub struct Line {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elbow: Option<Elbow>,
     /// Turn of the wrist at the end: whole revolutions of theta4, 0 from -pi to pi; the yaw turns as far as that takes. If
-    /// left out, it turns the shorter way.
+    /// left out, it turns the shorter way, half a turn so that the wrist ends nearer to the middle of its range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -WristTurn::MOST, max = WristTurn::MOST))]
     pub turn: Option<i8>,
@@ -171,7 +172,7 @@ pub struct Arc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elbow: Option<Elbow>,
     /// Turn of the wrist at the end: whole revolutions of theta4, 0 from -pi to pi; the yaw turns as far as that takes. If
-    /// left out, it turns the shorter way.
+    /// left out, it turns the shorter way, half a turn so that the wrist ends nearer to the middle of its range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -WristTurn::MOST, max = WristTurn::MOST))]
     pub turn: Option<i8>,
