@@ -81,10 +81,11 @@ pub struct Operator {
     is_imitated: bool,
     /// Sequence number of the last accepted move.
     last_move: Option<u8>,
-    /// Speed of the slowest move since the arm last arrived, the override included.
+    /// Speed of the slowest move since the arm last arrived.
     slowest: f32,
-    /// Speed override.
+    /// Speed override, and the least since then: it slows down the moves that are under way as well.
     pace: f32,
+    least_pace: f32,
     /// Whether the program has set it to 0: no move goes on until the program raises it.
     held: bool,
 }
@@ -117,6 +118,7 @@ impl Operator {
             last_move: None,
             slowest: 1.0,
             pace: 1.0,
+            least_pace: 1.0,
             held: false,
         }
     }
@@ -269,7 +271,7 @@ impl Operator {
                     Some(Outcome::Accepted) if request.is_move() => {
                         self.last_move = Some(self.awaited);
                     }
-                    None => self.slowest = self.slowest.min(self.pace * speed_of(request)),
+                    None => self.slowest = self.slowest.min(speed_of(request)),
                     _ if *request == MotionRequest::Stop => {
                         // The current move will never complete.
                         self.last_move = None;
@@ -296,7 +298,8 @@ impl Operator {
                 });
                 let limit = self.move_limit();
                 if arrived {
-                    self.slowest = self.pace;
+                    self.slowest = 1.0;
+                    self.least_pace = self.pace;
                 }
                 (arrived, limit)
             }
@@ -314,7 +317,7 @@ impl Operator {
             },
             Action::WaitArrived => OperatorError::Unfinished {
                 spot,
-                speed: self.slowest,
+                speed: self.slowest * self.least_pace,
                 limit,
             },
             _ => OperatorError::Late {
@@ -338,13 +341,21 @@ impl Operator {
         if self.held {
             return MODE_LIMIT;
         }
-        Duration::from_seconds((MOVE_LIMIT_S / f64::from(self.slowest)).min(ANY_MOVE_LIMIT_S))
+        let share = f64::from(self.slowest) * f64::from(self.least_pace);
+        Duration::from_seconds((MOVE_LIMIT_S / share).min(ANY_MOVE_LIMIT_S))
     }
 }
 
-/// Share of full speed that a request asks for.
+/// Share of full speed that a request asks for. Full speed is more than 1 m/s at the tool, which so is never longer on its way with
+/// a share of as many as its m/s.
 fn speed_of(request: &MotionRequest) -> f32 {
     match request {
+        MotionRequest::MoveLine {
+            speed, tool_speed, ..
+        }
+        | MotionRequest::MoveArc {
+            speed, tool_speed, ..
+        } if *tool_speed > 0.0 => speed.min(*tool_speed),
         MotionRequest::Jump { speed, .. }
         | MotionRequest::MoveLine { speed, .. }
         | MotionRequest::MoveArc { speed, .. }

@@ -287,6 +287,21 @@ fn a_slow_move_may_take_its_time() {
     assert!(rehearse(&config).unwrap().duration_s > 120.0);
 }
 
+/// 100 mm at 0.7 mm/s are 143 s, and an override of 1 % makes 200 s of the 2 s at a twentieth of the speed: as long as they take, an
+/// operator waits for them.
+#[test]
+fn the_operator_waits_for_slow_tools_and_slow_overrides() {
+    let slow = [
+        "line = { to = [0.6, 0.1, -0.2, 0.0], tool_speed = 0.0007 }\n[[cycle]]\ndwell = 0.1",
+        "line = { to = [0.6, 0.1, -0.2, 0.0], speed = 0.05 }\n[[cycle]]\noverride = { after = 0.1, to = 0.01 }\n[[cycle]]\ndwell = 0.1",
+    ];
+    for slow in slow {
+        let plan = rehearse(&scenario(&format!("[[cycle]]\n{slow}"))).unwrap();
+        assert_eq!(plan.refused, [], "{slow}");
+        assert!(plan.duration_s > 120.0, "{slow}: {}", plan.duration_s);
+    }
+}
+
 /// The arm of a rehearsal obeys no torque. What a law integrates must not grow in it, however long a move takes: a hundredth of
 /// the speed takes a hundred times as long.
 #[test]

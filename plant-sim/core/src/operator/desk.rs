@@ -276,7 +276,8 @@ impl Operator {
         self.given_up = false;
         self.alarmed = false;
         self.last_move = None;
-        self.slowest = self.pace;
+        self.slowest = 1.0;
+        self.least_pace = self.pace;
     }
 }
 

@@ -61,6 +61,7 @@ impl Operator {
     pub(super) fn send(&mut self, request: MotionRequest) -> Option<CanFrame> {
         if let MotionRequest::SetOverride { pace } = request {
             self.pace = pace;
+            self.least_pace = self.least_pace.min(pace);
             self.held = false;
         }
         self.sequence = self.sequence.wrapping_add(1);
