@@ -317,3 +317,30 @@ fn what_is_built_in_is_named_in_help_and_refusals() {
         assert!(help.contains(name), "{name}");
     }
 }
+
+/// The help of a command begins with what the list of commands says of it.
+#[test]
+fn help_begins_with_what_a_command_does() {
+    let help = |arguments: &[&str]| String::from_utf8(plant_sim(arguments).stdout).unwrap();
+    for group in [&[][..], &["campaign"], &["bench"], &["trace"]] {
+        let list = help(&[group, &["--help"]].concat());
+        let commands: Vec<_> = list
+            .lines()
+            .skip_while(|line| *line != "Commands:")
+            .skip(1)
+            .map_while(|line| line.strip_prefix("  "))
+            .filter(|line| !line.starts_with(' '))
+            .filter_map(|line| line.split_once(' '))
+            .filter(|(name, _)| *name != "help")
+            .collect();
+        assert!(!commands.is_empty(), "{list}");
+        for (name, does) in commands {
+            let own = help(&[group, &[name, "--help"]].concat());
+            let begins = own.lines().next().unwrap();
+            // Either may go on in its next line.
+            let does = does.trim().split(" [alias").next().unwrap();
+            let short = does.len().min(begins.len());
+            assert_eq!(begins[..short], does[..short], "{name}");
+        }
+    }
+}

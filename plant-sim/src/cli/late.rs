@@ -2,7 +2,18 @@
 
 use std::ops::Deref;
 
+use clap::builder::Resettable;
 use clap::{ArgMatches, Args, Command, Error, FromArgMatches, Subcommand};
+
+/// The command with its arguments, and described as in the list of commands: comments on the types of the arguments, which come later
+/// here, would take the place of that.
+fn as_listed(command: Command, augment: fn(Command) -> Command) -> Command {
+    let about = command.get_about().cloned();
+    let long_about = command.get_long_about().cloned();
+    augment(command)
+        .about(Resettable::from(about))
+        .long_about(Resettable::from(long_about))
+}
 
 /// These arguments.
 pub(super) struct Late<T>(T);
@@ -27,21 +38,21 @@ impl<T: FromArgMatches> FromArgMatches for Late<T> {
 
 impl<T: Args> Args for Late<T> {
     fn augment_args(command: Command) -> Command {
-        command.defer(T::augment_args)
+        command.defer(|command| as_listed(command, T::augment_args))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
-        command.defer(T::augment_args_for_update)
+        command.defer(|command| as_listed(command, T::augment_args_for_update))
     }
 }
 
 impl<T: Subcommand> Subcommand for Late<T> {
     fn augment_subcommands(command: Command) -> Command {
-        command.defer(T::augment_subcommands)
+        command.defer(|command| as_listed(command, T::augment_subcommands))
     }
 
     fn augment_subcommands_for_update(command: Command) -> Command {
-        command.defer(T::augment_subcommands_for_update)
+        command.defer(|command| as_listed(command, T::augment_subcommands_for_update))
     }
 
     fn has_subcommand(name: &str) -> bool {
