@@ -344,3 +344,32 @@ fn help_begins_with_what_a_command_does() {
         }
     }
 }
+
+#[test]
+fn a_robot_that_hangs_is_refused_by_file_and_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("hangs.json");
+    let text = include_str!("../models/irb930-22-1.05.json");
+    let hangs = text.replace("[0.0, 0.0, -9.81]", "[0.0, 0.0, 9.81]");
+    std::fs::write(&file, hangs).unwrap();
+    let file = file.to_str().unwrap();
+    for arguments in [
+        &["check", "--model", file][..],
+        &["check", "--plant-model", file],
+        &["model", file],
+    ] {
+        let output = plant_sim(arguments);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        let place = format!("{file}: line 4, column ");
+        assert!(error.contains(&place), "{error}");
+        assert!(
+            error.contains("gravity[2] is 9.81; it must be a number from -100 to 0 m/s2"),
+            "{error}"
+        );
+        assert!(
+            error.contains("a robot that hangs is not supported"),
+            "{error}"
+        );
+    }
+}

@@ -40,7 +40,7 @@ const BUILT_IN: [(&str, &str); 2] = [
 pub struct RobotModel {
     /// Free text.
     pub name: String,
-    /// Acceleration of gravity along -z of frame 0, m/s2: 9.81 for an upright robot, negative for an inverted one.
+    /// Acceleration of gravity along -z of frame 0, m/s2: 9.81, and not negative in a file: the controller knows no robot that hangs.
     pub gravity: f64,
     /// Distances between the axes.
     pub geometry: Geometry,

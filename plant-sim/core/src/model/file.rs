@@ -36,7 +36,7 @@ pub(super) const RISE_TIME: Each<4> = joints(
     Allowed::within(1e-4, 1.0, "s"),
     Allowed::within(1e-4, 1.0, "s"),
 );
-pub(super) const GRAVITY: Allowed = Allowed::within(-100.0, 100.0, "m/s2");
+pub(super) const GRAVITY: Allowed = Allowed::within(-100.0, 0.0, "m/s2");
 pub(super) const PAYLOAD_MAX: Allowed = Allowed::above_zero(100.0, "kg");
 pub(super) const GEAR_RATIO: Allowed = Allowed::within(0.01, 1e4, "");
 /// Of a motor with the torque above: a thousand times that of those shipped.
@@ -95,7 +95,8 @@ pub struct ModelFile {
     /// If there: a text that begins with SI.
     #[schemars(regex(pattern = "^SI"))]
     pub units: Option<String>,
-    /// Acceleration of gravity in frame 0; vertical. [0, 0, -9.81] for a robot that stands, positive for one that hangs.
+    /// Acceleration of gravity in frame 0; vertical, downwards: [0, 0, -9.81]. A robot that hangs is
+    /// not supported.
     #[schemars(transform = by(GRAVITY), transform = Exactly(VERTICAL))]
     pub gravity: [f64; 3],
     /// Denavit-Hartenberg lengths.

@@ -104,12 +104,18 @@ fn units(root: &Node<'_>) -> Result<(), ModelError> {
 }
 
 fn gravity(root: &Node<'_>) -> Result<f64, ModelError> {
-    let [x, y, z] = root.numbers("gravity", GRAVITY)?;
+    let vector = root.get("gravity", "an array of 3: [0, 0, z]")?;
+    let [x, y, _] = vector.as_numbers(Allowed::FINITE)?;
     if x != 0.0 || y != 0.0 {
         // The lift would no longer be the only axis that carries weight, which nothing here supports.
-        return Err(root.get("gravity", "")?.wrong("vertical: [0, 0, z]"));
+        return Err(vector.wrong("vertical: [0, 0, z]"));
     }
-    Ok(-z)
+    let [_, _, z] = vector.elements::<3>(GRAVITY)?;
+    if z.as_number(Allowed::FINITE)? > 0.0 {
+        // Nor that a brake which lets go lets the lift rise.
+        return Err(z.wrong(format!("{GRAVITY}: a robot that hangs is not supported")));
+    }
+    Ok(-z.as_number(GRAVITY)?)
 }
 
 fn geometry(dh: &Node<'_>, warnings: &mut Vec<String>) -> Result<Geometry, ModelError> {
