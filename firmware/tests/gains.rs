@@ -13,7 +13,7 @@
 mod draws;
 
 use firmware::control::laws::{Gains, Selection};
-use firmware::mechanics::arm::{Axis, IRB_930};
+use firmware::mechanics::arm::{Axis, IRB_930, Payload};
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 use protocol::messages::{Compensation, Law, RefusalReason};
@@ -201,12 +201,16 @@ fn an_integral_faster_than_its_loop_is_refused() {
 fn coarse_encoders_lower_the_gains() {
     let period = 5e-4;
     let usual = Gains::for_period(period);
+    let heaviest = Payload {
+        mass: 22.0,
+        ..Payload::NONE
+    };
     assert_eq!(Gains::for_arm(&IRB_930, period), usual);
     let share = |counts: f64| {
         let count = std::f64::consts::TAU / counts / 80.0;
         38.92 * (2.0 * 190.0 + 190.0) * count / 5e-4 / 640.0
     };
-    let (axis, found) = usual.encoder_step(&IRB_930, period);
+    let (axis, found) = usual.encoder_step(&IRB_930, &heaviest, period);
     assert_eq!(axis, Axis::Shoulder);
     assert!((f64::from(found) / share(131_072.0) - 1.0).abs() < 1e-3);
     let with = |counts| {
@@ -232,4 +236,31 @@ fn coarse_encoders_lower_the_gains() {
     }
     // None is lowered below its range.
     assert_eq!(with(16).bandwidth, 1.0);
+}
+
+/// A count of the wrist's encoder with 22 kg 0.4 m off the axis of the flange, by hand: 3.52 kg m2, beside which the rest of the wrist is
+/// nothing.
+#[test]
+fn loads_off_the_flange_lower_the_gains_for_the_wrist() {
+    let period = 5e-4;
+    let usual = Gains::for_period(period);
+    let load = Payload {
+        mass: 22.0,
+        com: nalgebra::Vector3::new(0.4, 0.0, 0.0),
+        ..Payload::NONE
+    };
+    let drive = &IRB_930.drive;
+    let count =
+        std::f64::consts::TAU / f64::from(drive.encoder_counts) / f64::from(drive.gear_ratio.w);
+    let limit = f64::from(IRB_930.limits.effort.w);
+    let share = 22.0 * 0.4 * 0.4 * (3.0 * f64::from(usual.bandwidth)) * count / 5e-4 / limit;
+    let (axis, found) = usual.encoder_step(&IRB_930, &load, period);
+    assert_eq!(axis, Axis::Wrist);
+    assert!(
+        (f64::from(found) / share - 1.0).abs() < 0.03,
+        "{found} {share}"
+    );
+    let gains = Gains::for_load(&IRB_930, &load, period);
+    let lowered = f64::from(usual.bandwidth * Gains::ENCODER_STEP / found);
+    assert!((f64::from(gains.bandwidth) / lowered - 1.0).abs() < 1e-3);
 }

@@ -17,6 +17,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::allowed::schema::{Gain, by};
 use crate::allowed::{PAYLOAD_COM, PAYLOAD_INERTIA, PAYLOAD_MASS};
 use crate::faults::Fault;
+use crate::maths::hypot;
 use crate::model::Payload;
 use crate::selection::LawChoice;
 
@@ -197,6 +198,12 @@ impl PayloadSpec {
             com_flange_frame: [0.0, 0.0, 0.05],
             inertia_com_diag: [0.004 * mass, 0.004 * mass, 0.005 * mass],
         }
+    }
+
+    /// Distance of its centre of mass from the axis of the flange, m.
+    pub(crate) fn off_axis(&self) -> f64 {
+        let [x, y, _] = self.com_flange_frame;
+        hypot(x, y)
     }
 
     /// The same body, `factor` times as dense.

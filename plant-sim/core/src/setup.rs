@@ -81,15 +81,13 @@ pub enum SetupError {
     },
     /// Gains that the encoders bear do not hold the arm.
     #[error(
-        "model {robot}: drive.encoder_counts_per_motor_rev is {counts}, too coarse at {rate_hz} Hz: a count would be {percent:.0} % of the \
+        "{subject}, too coarse at {rate_hz} Hz: a count would be {percent:.0} % of the \
          torque limit of the {axis}, and a loop that bears that has a bandwidth of {bandwidth:.1} rad/s, which hardly holds the arm; \
          allowed: {least} counts or more{slower}, or give gains.bandwidth and gains.observer"
     )]
     Coarse {
-        /// Robot.
-        robot: String,
-        /// Counts per turn of the motor.
-        counts: u32,
+        /// Robot, counts of its encoders and what it carries.
+        subject: String,
         /// Control rate.
         rate_hz: f64,
         /// Share of the torque limit with the usual gains, %.

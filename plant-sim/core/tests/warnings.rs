@@ -214,3 +214,31 @@ impl Observer for Asked {
         Ok(())
     }
 }
+
+/// A payload far off the axis of the flange: a count of the wrist's encoder is a third of its torque with the usual gains, on which the wrist
+/// chatters. By hand in the controller's test `gains`.
+#[test]
+fn gains_are_lowered_for_a_payload_off_the_axis() {
+    for (mass, off, rate_hz) in [
+        (22.0, [0.4, 0.0], 2000.0),
+        (22.0, [0.0, -0.8], 1000.0),
+        (10.0, [-1.0, 0.0], 1000.0),
+        (5.0, [0.6, 0.8], 2000.0),
+    ] {
+        let mut config = RunConfig::new(Scenario::built_in("gate-22kg").unwrap());
+        config.scenario.cycles = 2;
+        config.scenario.rate_hz = rate_hz;
+        let payload = config.scenario.payload.as_mut().unwrap();
+        payload.mass = mass;
+        payload.com_flange_frame = [off[0], off[1], 0.05];
+        let warnings = config.warnings();
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        let words = format!("a payload of {mass} kg has its centre of mass");
+        assert!(warnings[0].contains(&words), "{warnings:?}");
+        let summary = run(&config);
+        assert_eq!(summary.error, None, "{mass} {off:?}");
+        let used = summary.recipe.gains.bandwidth;
+        let words = format!("uses gains.bandwidth {used:.1}");
+        assert!(warnings[0].contains(&words), "{warnings:?}");
+    }
+}

@@ -22,7 +22,8 @@
 //!
 //! up and down, from sample to sample. What it takes of the torque limit is lost to moves, which need that limit, and beyond some
 //! tenths the loop does nothing but chatter. So the defaults are lowered until it is [`Gains::ENCODER_STEP`] at the most, for the arm stretched
-//! with the heaviest payload; of a finer encoder nothing is to be seen.
+//! with the heaviest payload; of a finer encoder nothing is to be seen. A payload off the axis of the flange can have many times the
+//! inertia of everything else that the wrist turns: whoever announces one lowers the gains for it ([`Gains::for_load`]).
 
 use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
@@ -61,12 +62,22 @@ impl Gains {
         }
     }
 
-    /// The same for `arm`: with bandwidth and observer lowered where its encoders are too coarse for them.
+    /// The same for `arm` with its heaviest payload, on the axis of the flange: with bandwidth and observer lowered where its encoders are too
+    /// coarse for them.
+    pub fn for_arm(arm: &ArmModel, period: f32) -> Self {
+        let heaviest = Payload {
+            mass: arm.payload_max,
+            ..Payload::NONE
+        };
+        Self::for_load(arm, &heaviest, period)
+    }
+
+    /// The same for `arm` with this payload.
     // Out of line: once.
     #[inline(never)]
-    pub fn for_arm(arm: &ArmModel, period: f32) -> Self {
+    pub fn for_load(arm: &ArmModel, payload: &Payload, period: f32) -> Self {
         let mut gains = Self::for_period(period);
-        let (_, step) = gains.encoder_step(arm, period);
+        let (_, step) = gains.encoder_step(arm, payload, period);
         if step > Self::ENCODER_STEP {
             let lower = |gain: &mut f32, least: f32| {
                 *gain = (*gain * (Self::ENCODER_STEP / step)).max(least)
@@ -78,13 +89,9 @@ impl Gains {
     }
 
     /// The axis on which a count of the encoder makes the greatest step of the torque, as a share of its limit, and that share. For
-    /// the stretched arm with the heaviest payload.
-    pub fn encoder_step(&self, arm: &ArmModel, period: f32) -> (Axis, f32) {
-        let heaviest = Payload {
-            mass: arm.payload_max,
-            ..Payload::NONE
-        };
-        let body = Body::new(arm, &heaviest);
+    /// the stretched arm, with the centre of mass of `payload` where frame 4 has it while axis 4 is at 0: farthest out along x.
+    pub fn encoder_step(&self, arm: &ArmModel, payload: &Payload, period: f32) -> (Axis, f32) {
+        let body = Body::new(arm, payload);
         let inertia = body.own_inertia(&Trig::new(&Vector4::zeros()));
         let count = body.drive.motor_angle_of_counts(&[1; 4]);
         // What each axis gets from its own motor, which turns as much more as it gives less.

@@ -1,11 +1,11 @@
 //! What the steps of the encoders make of the torques, foreseen: see [`Gains`].
 
 use firmware::control::laws::Gains;
-use firmware::mechanics::arm::ArmModel;
+use firmware::mechanics::arm::{ArmModel, Payload};
 
 use super::{RunConfig, SetupError};
-use crate::model::AXES;
-use crate::scenario::Scenario;
+use crate::model::{self, AXES};
+use crate::scenario::{PayloadSpec, Scenario, Step};
 
 /// Bandwidth (rad/s) below which the controller's own gains are refused: it takes a tenth of a second to answer, in which friction alone
 /// puts the tool off by millimetres.
@@ -14,16 +14,50 @@ const LEAST_BANDWIDTH: f64 = 10.0;
 const LEAST_RATE: f64 = 100.0;
 
 impl RunConfig {
-    /// The gains that the controller has by itself.
+    /// The gains of a scenario that says none: those that the controller has by itself, or lower ones for a load off the axis of the flange.
     pub(crate) fn own_gains(&self) -> Gains {
-        Gains::for_arm(&ArmModel::from(&self.nominal), self.period())
+        Gains::for_load(
+            &ArmModel::from(&self.nominal),
+            &self.hardest_load().0,
+            self.period(),
+        )
     }
 
-    /// The scenario with every gain, if it has any.
+    /// The scenario with every gain, if it has any or needs others than the controller has by itself.
     pub(crate) fn asked(&self) -> Scenario {
         let mut scenario = self.scenario.clone();
-        scenario.gains = scenario.gains.map(|it| it.complete(&self.own_gains()));
+        let own = self.own_gains();
+        let needs = own != Gains::for_arm(&ArmModel::from(&self.nominal), self.period());
+        let asked = scenario.gains.or_else(|| needs.then(Default::default));
+        scenario.gains = asked.map(|it| it.complete(&own));
         scenario
+    }
+
+    /// Of the heaviest payload on the axis of the flange and those that the scenario has, the one with which a count of an encoder makes the
+    /// greatest step, wherever axis 4 turns it; and as which payload the scenario has that.
+    fn hardest_load(&self) -> (Payload, Option<PayloadSpec>) {
+        let arm = ArmModel::from(&self.nominal);
+        let usual = Gains::for_period(self.period());
+        let step = |load: &Payload| usual.encoder_step(&arm, load, self.period()).1;
+        let picked = |step: &Step| match step {
+            Step::Pick(payload) => Some(*payload),
+            _ => None,
+        };
+        let picked = self.scenario.cycle.iter().filter_map(picked);
+        let heaviest = Payload {
+            mass: arm.payload_max,
+            ..Payload::NONE
+        };
+        let mut hardest = (heaviest, None);
+        for spec in self.scenario.payload.into_iter().chain(picked) {
+            let mut load = Payload::from(&model::Payload::from(spec));
+            load.com.x = spec.off_axis() as f32;
+            load.com.y = 0.0;
+            if step(&load) > step(&hardest.0) {
+                hardest = (load, Some(spec));
+            }
+        }
+        hardest
     }
 
     fn period(&self) -> f32 {
@@ -32,7 +66,8 @@ impl RunConfig {
 
     /// The axis on which a count makes the greatest step of the torque with these gains, and that step as a share of its limit.
     fn step(&self, gains: &Gains) -> (&'static str, f64) {
-        let (axis, share) = gains.encoder_step(&ArmModel::from(&self.nominal), self.period());
+        let arm = ArmModel::from(&self.nominal);
+        let (axis, share) = gains.encoder_step(&arm, &self.hardest_load().0, self.period());
         (AXES[axis as usize], f64::from(share))
     }
 
@@ -44,8 +79,15 @@ impl RunConfig {
 
     /// The robot, and what its encoders are.
     fn subject(&self) -> String {
+        let load = self.hardest_load().1.map_or_else(String::new, |load| {
+            format!(
+                " and a payload of {} kg has its centre of mass {:.2} m off the axis of the flange",
+                load.mass,
+                load.off_axis()
+            )
+        });
         format!(
-            "model {}: drive.encoder_counts_per_motor_rev is {}",
+            "model {}: drive.encoder_counts_per_motor_rev is {}{load}",
             self.nominal.name, self.nominal.drive.encoder_counts
         )
     }
@@ -64,8 +106,7 @@ impl RunConfig {
         let (counts, rate_hz) = (self.nominal.drive.encoder_counts, self.scenario.rate_hz);
         let slower = (rate_hz * left / LEAST_BANDWIDTH).floor();
         Some(SetupError::Coarse {
-            robot: self.nominal.name.clone(),
-            counts,
+            subject: self.subject(),
             rate_hz,
             percent: share * 100.0,
             axis,
