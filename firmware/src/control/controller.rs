@@ -123,6 +123,8 @@ pub struct Controller {
     missed: u32,
     /// Samples in a row in which an encoder did not move with its axis at its torque limit, those off the reference several times.
     stuck: u32,
+    /// Motor velocities in the last of them, rad/s.
+    strained: Vector4<f32>,
     /// A fault not reported to the peers yet.
     alarm: Option<Fault>,
     /// What the last sample followed, as handed to the law.
@@ -177,6 +179,7 @@ impl Controller {
             alarm: None,
             saturated: 0,
             stuck: 0,
+            strained: Vector4::zeros(),
             missed: 0,
             queue: MoveQueue::new(),
             setpoint: Setpoint::rest(Vector4::zeros()),

@@ -19,6 +19,8 @@ const STUCK_SAMPLES: u32 = 2;
 /// is meant to: it has [`PATIENCE`] times as long.
 const STUCK_ERROR: f32 = 0.05;
 const PATIENCE: u32 = 8;
+/// How much faster a motor gets whose axis turns back however much the others work against it, rad/s². Its encoder moves.
+const TURNING: f32 = 100.0;
 /// Share of its greatest speed below which an axis hardly moves. It passes that within milliseconds when it turns back.
 const SLOW: f32 = 0.1;
 
@@ -61,7 +63,14 @@ impl Controller {
         let stands = |axis: &Axis| at_limit(axis) && axis.of(qd).abs() < axis.of(&slow);
 
         let stuck = Axis::ALL.into_iter().find(is_stuck);
+        let before = self.strained;
+        self.strained = readings.velocity;
+        let turns = |axis: Axis| {
+            let gained = axis.of(&(readings.velocity - before)) * axis.of(&excess).signum();
+            readings.stays_still(axis, axis.of(&before)) && gained > TURNING * period
+        };
         match stuck.or(Axis::ALL.into_iter().find(is_still)) {
+            Some(axis) if self.stuck > 0 && turns(axis) => {}
             Some(axis) if !self.state.is_braking() => {
                 self.stuck += if stuck.is_some() { PATIENCE } else { 1 };
                 let is_long = self.stuck as f32 * period > STUCK_TIME * PATIENCE as f32;
