@@ -57,7 +57,7 @@ impl Allowed {
         (self.low..=self.high).contains(&number) && !(self.above && number as f32 <= 0.0)
     }
 
-    /// The mistaken unit that would explain a number, if any: millimetres or degrees.
+    /// The mistaken unit that would explain a number, if any: millimetres, degrees or per cent.
     pub(crate) fn slip(self, number: f64) -> Option<String> {
         match self.unit {
             "m" if self.admits(number / 1000.0) && number.abs() >= 10.0 => Some(format!(
@@ -68,6 +68,13 @@ impl Allowed {
                 "angles are in rad: {number} degrees is {:.6}",
                 number.to_radians()
             )),
+            "m/s" if self.admits(number / 1000.0) => Some(format!(
+                "speeds are in m/s: {number} mm/s is {}",
+                number / 1000.0
+            )),
+            "of full speed" | "of the planned speed" if self.admits(number / 100.0) => Some(
+                format!("speeds are shares of 1: {number} % is {}", number / 100.0),
+            ),
             _ => None,
         }
     }

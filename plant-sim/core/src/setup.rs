@@ -102,10 +102,12 @@ pub enum SetupError {
         slower: String,
     },
     /// The bus cannot carry the messages at this rate.
-    #[error("at {rate_hz} Hz the {source}; lower the rate")]
+    #[error("at {rate_hz} Hz the {source}; lower the rate, to {most} Hz at the most")]
     Link {
         /// Control rate.
         rate_hz: f64,
+        /// Greatest rate in whole Hz that it can carry.
+        most: u32,
         /// Load.
         source: Overload,
     },
@@ -163,6 +165,7 @@ impl RunConfig {
         let load = rig::admit(&timing, scenario.rate_hz);
         wrong.extend(load.err().map(|source| SetupError::Link {
             rate_hz: scenario.rate_hz,
+            most: greatest_rate(&timing, scenario.rate_hz as u32),
             source,
         }));
         let start = start(scenario, &actual).map_err(|error| wrong.push(error));
@@ -242,6 +245,19 @@ impl RunConfig {
     }
 }
 
+/// The greatest rate (whole Hz) below this one that the bus can carry.
+fn greatest_rate(timing: &BitTiming, above: u32) -> u32 {
+    let (mut carried, mut refused) = (0, above.saturating_add(1));
+    while refused - carried > 1 {
+        let rate = carried.midpoint(refused);
+        match rig::admit(timing, rate.into()) {
+            Ok(_) => carried = rate,
+            Err(_) => refused = rate,
+        }
+    }
+    carried
+}
+
 /// Joint positions at the start.
 fn start(scenario: &Scenario, robot: &RobotModel) -> Result<[f64; 4], SetupError> {
     let [x, y, z, yaw] = scenario.start;
@@ -311,8 +327,17 @@ fn out_of_range(violation: Violation, robot: &RobotModel, q: &Vector4<f64>) -> S
         Violation::Wrist => (3, "wrist", "rad"),
     };
     let JointLimits { lower, upper, .. } = &robot.limits;
+    // With as many digits as it takes to see that it is outside.
+    let text = |digits: usize| format!("{:.digits$}", q[axis]);
+    let is_outside = |text: &String| {
+        let shown = text.parse().unwrap_or(q[axis]);
+        !(lower[axis]..=upper[axis]).contains(&shown)
+    };
+    let shown = [6, 9, 12].map(text).into_iter().find(is_outside);
     format!(
-        "axis {name} would have to be at {:.6} {unit}; allowed: {} to {} {unit}",
-        q[axis], lower[axis], upper[axis]
+        "axis {name} would have to be at {} {unit}; allowed: {} to {} {unit}",
+        shown.unwrap_or_else(|| q[axis].to_string()),
+        lower[axis],
+        upper[axis]
     )
 }

@@ -52,6 +52,15 @@ impl Change {
                         format!("there is no {path}; the first of {number} is [0]")
                     })?
                 }
+                // A step has one key, its kind.
+                (None, Value::Table(step))
+                    if path.starts_with("cycle[")
+                        && path.ends_with(']')
+                        && !step.contains_key(word) =>
+                {
+                    let kinds: Vec<_> = step.keys().map(String::as_str).collect();
+                    return Err(format!("{path} is no {word}, but a {}", kinds.join(", ")));
+                }
                 (None, Value::Table(table)) => {
                     path += &format!(".{word}");
                     table.entry(word).or_insert(Value::Table(Table::new()))

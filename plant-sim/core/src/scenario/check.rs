@@ -244,8 +244,9 @@ impl<'a> Findings<'a> {
             );
             self.wrong("gains.bandwidth", bandwidth, allowed);
         } else {
+            let whose = (gains.observer).map_or("; it is the default: give one as well", |_| "");
             let allowed = format!(
-                "at most {limit:.1} rad/s, bandwidth times damping, with a law that integrates"
+                "at most {limit:.1} rad/s, bandwidth times damping, with a law that integrates{whose}"
             );
             self.wrong("gains.observer", observer, allowed);
         }
