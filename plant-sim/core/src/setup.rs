@@ -214,6 +214,7 @@ impl RunConfig {
             ));
         }
         warnings.extend(self.coarse());
+        warnings.extend(self.lags());
         warnings
     }
 

@@ -242,3 +242,29 @@ fn gains_are_lowered_for_a_payload_off_the_axis() {
         assert!(warnings[0].contains(&words), "{warnings:?}");
     }
 }
+
+/// Laws without a model of the arm are behind by acceleration over squared bandwidth: the run is the oracle at low rates, where the gate ends as a
+/// following error of the lift, and at a rate at which it does not.
+#[test]
+fn a_law_that_stays_behind_at_a_low_rate_is_warned_of() {
+    for law in ["pid", "pd-gravity", "kinematic-joint", "kinematic-task"] {
+        for (rate_hz, stays_behind) in [(120.0, true), (200.0, true), (1000.0, false)] {
+            let mut config = RunConfig::new(Scenario::built_in("gate").unwrap());
+            config.scenario.cycles = 1;
+            config.scenario.rate_hz = rate_hz;
+            config.scenario.law = law.parse().unwrap();
+            let words = format!("at {rate_hz} Hz {law}, which has no model of the arm");
+            let warned = config
+                .warnings()
+                .iter()
+                .any(|said| said.starts_with(&words));
+            assert_eq!(warned, stays_behind, "{law} {rate_hz}");
+            let error = run(&config).error.unwrap_or_default();
+            assert_eq!(
+                error.contains("following error, axis 3"),
+                stays_behind,
+                "{law} {rate_hz}: {error}"
+            );
+        }
+    }
+}

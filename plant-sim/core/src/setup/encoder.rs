@@ -1,7 +1,9 @@
 //! What the steps of the encoders make of the torques, foreseen: see [`Gains`].
 
 use firmware::control::laws::Gains;
+use firmware::control::monitor::MonitorLimits;
 use firmware::mechanics::arm::{ArmModel, Payload};
+use firmware::mechanics::body::Body;
 
 use super::{RunConfig, SetupError};
 use crate::model::{self, AXES};
@@ -151,6 +153,33 @@ impl RunConfig {
         Some(format!(
             "{advice}: torques swing, which slows moves down and may stop the arm for chatter"
         ))
+    }
+
+    /// A law without a model of the arm, at a rate at which it stays behind by more than the lift's following error. It needs an error to speed up by:
+    /// the acceleration over the square of the bandwidth.
+    pub(super) fn lags(&self) -> Option<String> {
+        let Scenario { law, rate_hz, .. } = self.scenario;
+        if law.law.takes_compensation() {
+            return None;
+        }
+        let arm = ArmModel::from(&self.nominal);
+        let payload = self.scenario.payload.unwrap_or(PayloadSpec::NOTHING);
+        let body = Body::new(&arm, &Payload::from(&model::Payload::from(payload)));
+        let fastest = f64::from(body.torque_limit.z / body.nominal_inertia.z);
+        let limit = f64::from(MonitorLimits::DEFAULT.following_error.z);
+        let own = self.own_gains();
+        let [(_, _, bandwidth), ..] = self.scenario.gains.unwrap_or_default().each(&own);
+        let least = (fastest / limit).sqrt();
+        (bandwidth < least).then(|| {
+            format!(
+                "at {rate_hz} Hz {law}, which has no model of the arm, has a bandwidth of {bandwidth:.0} rad/s: a lift that speeds up with all its \
+                 torque, {fastest:.0} m/s2, is {:.0} mm behind, and more than {:.0} mm end a run as a following error; from {least:.0} rad/s on it \
+                 keeps up, by itself at {:.0} Hz; say a lower speed, a higher rate_hz or another law",
+                fastest / (bandwidth * bandwidth) * 1e3,
+                limit * 1e3,
+                (rate_hz * least / f64::from(Gains::for_period(self.period()).bandwidth)).ceil(),
+            )
+        })
     }
 
     /// What may help a run that its controller stops, where encoders are too coarse for the usual gains.
