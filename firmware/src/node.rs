@@ -54,6 +54,8 @@ pub struct Node {
     received: Counters,
     unsent: u16,
     bad_feedback: u8,
+    /// Samples in a row in which the drives have had a late command.
+    late: u8,
     /// Frames since the newest feedback that are no message, saturating.
     strangers: u16,
     /// So many of a flood that has ended, for some more feedbacks, or 0.
@@ -94,6 +96,7 @@ impl Node {
             received: Counters::default(),
             unsent: 0,
             bad_feedback: 0,
+            late: 0,
             strangers: 0,
             flood: 0,
             flood_fades: 0,
@@ -272,6 +275,11 @@ impl Node {
             self.feel_flood(steps, feedback.status);
         }
         self.strangers = 0;
+        if feedback.status.contains(DriveStatus::COMMAND_LATE) {
+            self.come_late();
+        } else {
+            self.late = 0;
+        }
         if self.controller.mode() == Mode::PreOperational
             && self.same_schema == Some(true)
             && feedback.status.contains(DriveStatus::ENCODER_VALID)

@@ -27,6 +27,7 @@ overrun         5 samples    stop           brake          nothing        reset
 peer-silent     100 ms       off            off            off            reset
 operator-silent 250 ms       stop           nothing        nothing        reset
 reordered       3 frames     stop           brake          nothing        reset
+late            3 frames     stop           nothing        nothing        reset
 corrupted       3 frames     stop           brake          nothing        reset
 duplicate-node  at once      stop           nothing        nothing        reset
 bad-value       3 frames     off            off            off            reset
@@ -86,6 +87,9 @@ fn seen_by(cause: Cause) -> &'static str {
         }
         Cause::OperatorSilent => "age of the operator's heartbeat, once one was heard",
         Cause::Reordered => "counter of the feedback: repeated or old",
+        Cause::Late => {
+            "drives: their newest command answers a sample of 2 ms before, or older, as feedback or command was held up"
+        }
         Cause::Corrupted => "format, length or CRC of the feedback",
         Cause::DuplicateNode => "frame that only the controller sends",
         Cause::BadValue => "value in the feedback; once in a torque of the law",

@@ -116,7 +116,7 @@ macro_rules! bits {
             /// Set of this wire value, or `None` if a reserved bit is set.
             #[must_use]
             pub const fn from_bits(bits: $raw) -> Option<Self> {
-                if bits & !Self::DEFINED == 0 { Some(Self(bits)) } else { None }
+                if bits & Self::DEFINED == bits { Some(Self(bits)) } else { None }
             }
 
             /// Whether all bits of `other` are set.

@@ -121,6 +121,7 @@ operator-silent --fault operator:silent@0.3s..0.7s
 reordered --fault feedback:replay=8@0.45s
 reordered --fault feedback:forged@0.45s
 none --fault feedback:reorder@0.45s
+late --fault command:delay=0.004@0.45s
 corrupted --fault feedback:corrupt@0.45s
 corrupted --fault feedback:masquerade@0.45s
 bad-value --fault feedback:bad-value@0.45s

@@ -126,7 +126,7 @@ const fn row(
 }
 
 /// Every cause that the controller raises.
-pub static REACTIONS: [Row; 22] = {
+pub static REACTIONS: [Row; 23] = {
     use Latch::{Reset, Restart};
     use Limit::{AtOnce, EachAxis, Frames, Milliseconds, Percent, Samples};
     use Reaction::{Brake, EmergencyStop, None, Off, Stop};
@@ -165,6 +165,8 @@ pub static REACTIONS: [Row; 22] = {
             [Stop, Brake, None],
             Reset,
         ),
+        // As long as it lasts, the stop meets it in every sample.
+        row(Cause::Late, Frames(BAD_FRAMES), [Stop, None, None], Reset),
         row(
             Cause::Corrupted,
             Frames(BAD_FRAMES),

@@ -122,6 +122,17 @@ impl Node {
         }
     }
 
+    /// The drives have had a late command: they alone know how old its sample is by their clock, whichever of both frames was held up.
+    // Out of line: rare.
+    #[inline(never)]
+    pub(super) fn come_late(&mut self) {
+        self.late = self.late.saturating_add(1);
+        if u32::from(self.late) >= self.controller.setup().bad_frames {
+            let late = f32::from(core::mem::take(&mut self.late));
+            self.controller.fail(Fault::value(Cause::Late, late, 0.0));
+        }
+    }
+
     /// Judges frames that have come in place of a feedback, which is now there, `steps` samples after the last one. By themselves they change
     /// nothing. Feedback that had waited for their end comes first, and what has followed from them later.
     // Out of line: rare.

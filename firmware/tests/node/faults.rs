@@ -159,23 +159,19 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.node.bus_off();
             bench.step()
         }
-        Cause::Overrun => {
-            for _ in 0..4 {
+        Cause::Overrun => (0..5)
+            .flat_map(|_| {
                 bench.node.count_overrun();
-                bench.step();
-            }
-            bench.node.count_overrun();
-            bench.step()
-        }
+                bench.step()
+            })
+            .collect(),
         Cause::PeerSilent => {
             bench.now += SILENCE;
             bench.poll()
         }
         Cause::OperatorSilent => {
-            bench
-                .wire
-                .to_node
-                .push_back(heartbeat(Name::Operator, Mode::Ready, 0));
+            let beat = heartbeat(Name::Operator, Mode::Ready, 0);
+            bench.wire.to_node.push_back(beat);
             bench.run(262)
         }
         Cause::Reordered => {
@@ -183,16 +179,18 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.wire.to_node.push_back(frame);
             repeat(&mut bench, frame)
         }
+        Cause::Late => {
+            bench.status = bench.status | DriveStatus::COMMAND_LATE;
+            bench.run(3)
+        }
         Cause::Corrupted => {
             let good = bench.next_feedback();
             let short = CanFrame::fd(good.id(), &good.data()[..32], true).unwrap();
             repeat(&mut bench, short)
         }
         Cause::DuplicateNode => {
-            bench
-                .wire
-                .to_node
-                .push_back(heartbeat(Name::Controller, Mode::Ready, 3));
+            let beat = heartbeat(Name::Controller, Mode::Ready, 3);
+            bench.wire.to_node.push_back(beat);
             bench.step()
         }
         Cause::BadValue => {
@@ -288,6 +286,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::PeerSilent => "peer silent: 100.001 ms, limit 100.000 ms".into(),
             Cause::OperatorSilent => "operator silent: 258.0 ms, limit 250.0 ms".into(),
             Cause::Reordered => "reordered: 3 frames in a row".into(),
+            Cause::Late => "late: 3 frames in a row".into(),
             Cause::Corrupted => "corrupted: 3 frames in a row".into(),
             Cause::DuplicateNode => "duplicate node: identifier 0x741".into(),
             Cause::BadValue => "bad value: 3 frames in a row".into(),

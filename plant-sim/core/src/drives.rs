@@ -16,7 +16,7 @@ use protocol::messages::{
 };
 use protocol::parameters::{self, DriveParameter};
 use protocol::table;
-use protocol::time::{Instant, Period};
+use protocol::time::{Duration, Instant, Period};
 
 use crate::heart::Heart;
 use crate::model::{DriveTrain, RobotModel};
@@ -27,6 +27,9 @@ use settings::Settings;
 
 /// Default number of samples for which the last command is held without a new one.
 pub const HOLD_SAMPLES: u32 = DriveParameter::HoldSamples.initial(1.0) as u32;
+
+/// Age from which on the sample that a command answers makes it late: a feedback of 2 ms before is old.
+const LATE: Duration = Duration::from_millis(2);
 
 /// The drives.
 #[derive(Clone, Debug)]
@@ -52,6 +55,8 @@ pub struct Drives {
     /// Time of that command.
     commanded: Instant,
     control: ControlWord,
+    /// Whether that command was late.
+    late: bool,
     /// Whether they have switched off by themselves, and no command has let go of torque since.
     let_down: bool,
 }
@@ -80,6 +85,7 @@ impl Drives {
             answered: None,
             commanded: Instant::ORIGIN,
             control: ControlWord::EMPTY,
+            late: false,
             let_down: false,
         }
     }
@@ -113,6 +119,7 @@ impl Drives {
                 .with(DriveStatus::FAULT, plant.has_dip())
                 .with(DriveStatus::TORQUE_ON, powered)
                 .with(DriveStatus::BRAKE_RELEASED, !plant.brake().is_closed())
+                .with(DriveStatus::COMMAND_LATE, self.late)
                 .with(
                     DriveStatus::TORQUE_SATURATED,
                     self.cut || plant.is_saturated(),
@@ -154,6 +161,9 @@ impl Drives {
             && self.commands.check(received.counter.unwrap_or(0)).is_new()
         {
             self.commanded = now;
+            // Whole samples by which it has missed its own; at a low rate it is late from the first one on.
+            let missed = self.age(command.sample);
+            self.late = missed > 0 && self.period.duration() * missed >= LATE;
             self.apply(&command, plant);
         }
     }
@@ -247,6 +257,7 @@ impl Drives {
         plant.set_brake(true);
         plant.set_torque_enabled(false);
         self.control = ControlWord::EMPTY;
+        self.late = false;
         self.commands.reset();
         self.requests.reset();
     }

@@ -119,8 +119,13 @@ impl Bench {
     }
 
     fn command(&mut self, torque: f32) {
+        self.answer(0, torque);
+    }
+
+    /// A command that has missed so many samples since the one that it answers.
+    fn answer(&mut self, missed: u32, torque: f32) {
         let command = Command {
-            sample: self.sample - 1,
+            sample: self.sample - 1 - missed,
             control: ControlWord::TORQUE_ENABLE,
             torque: [torque, 0.0, 0.0, 0.0],
         };
@@ -184,6 +189,25 @@ fn a_torque_limit_cuts_the_next_command() {
     let given = bench.world.plant.motor_torque()[0];
     assert!((given + 0.2 * greatest).abs() < 1e-6 * greatest, "{given}");
     assert!(!bench.sample().contains(DriveStatus::TORQUE_SATURATED));
+}
+
+/// A command is late that answers a sample of 2 ms before, and stays so until the next one.
+#[test]
+fn drives_say_that_their_command_is_late() {
+    for missed in 0..5 {
+        let mut bench = Bench::new();
+        for _ in 0..=missed {
+            bench.sample();
+        }
+        bench.answer(missed, 0.0);
+        for _ in 0..2 {
+            let status = bench.sample();
+            let is_late = status.contains(DriveStatus::COMMAND_LATE);
+            assert_eq!(is_late, missed >= 2, "{missed}");
+        }
+        bench.command(0.0);
+        assert!(!bench.sample().contains(DriveStatus::COMMAND_LATE));
+    }
 }
 
 /// Samples without a command until the drives switch torque off.

@@ -38,6 +38,8 @@ bits! {
         FAULT = 5, "fault";
         /// Positions come from the encoders and are referenced.
         ENCODER_VALID = 6, "encoder-valid";
+        /// The newest command was late: it answers a sample of 2 ms before, or older.
+        COMMAND_LATE = 7, "command-late";
     }
 }
 

@@ -215,9 +215,14 @@ impl Fault {
                 Cause::FeedbackLost | Cause::PeerSilent | Cause::OperatorSilent | Cause::OverTorque,
                 _,
             ) => Unit::Millisecond,
-            (Cause::Babbling | Cause::Reordered | Cause::Corrupted | Cause::BadValue, _) => {
-                Unit::Frame
-            }
+            (
+                Cause::Babbling
+                | Cause::Reordered
+                | Cause::Late
+                | Cause::Corrupted
+                | Cause::BadValue,
+                _,
+            ) => Unit::Frame,
             (
                 Cause::FollowingError | Cause::SoftLimit | Cause::StuckSensor | Cause::EncoderFault,
                 None,

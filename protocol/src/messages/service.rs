@@ -237,6 +237,8 @@ codes! {
         Chatter = 22, "chatter";
         /// A motor is hotter than it may be for ever, and moving more slowly has not helped.
         Overload = 23, "overload";
+        /// The answers of the controller reach the drives too late, with the feedback or the command held up on its way.
+        Late = 24, "late";
     }
 }
 
@@ -254,7 +256,7 @@ impl Cause {
             Self::PeerSilent | Self::OperatorSilent => 0x8130,
             Self::BusOff => 0x8140,
             Self::DuplicateNode => 0x8150,
-            Self::Reordered | Self::Corrupted | Self::BadValue => 0x8200,
+            Self::Reordered | Self::Late | Self::Corrupted | Self::BadValue => 0x8200,
             Self::FeedbackLost => 0x8250,
             Self::Chatter => 0x8300,
             Self::OverTorque => 0x8311,

@@ -23,8 +23,15 @@ const HEARS_NOTHING: &[Cause] = &[
 ];
 /// No command arrives. Feedback goes on, and says that the drives have let go.
 const LET_GO: &[Cause] = &[Cause::DriveFault];
-/// Feedback is held up, its sender does not miss it: what is told depends on which frame comes first.
-const HELD_UP: &[Cause] = &[Cause::FeedbackLost, Cause::PeerSilent, Cause::DriveFault];
+/// Feedback is held up, its sender does not miss it: what is told depends on how long, and on which frame comes first.
+const HELD_UP: &[Cause] = &[
+    Cause::Late,
+    Cause::FeedbackLost,
+    Cause::PeerSilent,
+    Cause::DriveFault,
+];
+/// Commands are held up: late for the drives, or too late.
+const LATE: &[Cause] = &[Cause::Late, Cause::DriveFault];
 /// Attempts in vain take a node off the bus; its frames are held up.
 const OFF_THE_BUS: &[Cause] = &[
     Cause::BusOff,
@@ -32,8 +39,8 @@ const OFF_THE_BUS: &[Cause] = &[
     Cause::PeerSilent,
     Cause::DriveFault,
 ];
-/// Counter or sample of the feedback stand or go backwards.
-const OLD: &[Cause] = &[Cause::Reordered];
+/// Counter or sample of the feedback stand or go backwards; at 500 Hz, one from a sample before is late already.
+const OLD: &[Cause] = &[Cause::Reordered, Cause::Late];
 /// The loop closes on a reading that is not so.
 const LIE: &[Cause] = &[
     Cause::EncoderFault,
@@ -100,8 +107,8 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
         What::Babbling(_) => &[Cause::Babbling],
         What::Wires(_) => OFF_THE_BUS,
         What::Attempts(info, kind, share) => match (info.content, kind) {
-            (Content::Command, ErrorKind::Ack) => LET_GO,
-            // 32 attempts take less than the five samples for which the drives hold a command.
+            (Content::Command, ErrorKind::Ack) => LATE,
+            // 32 attempts take less than the 5 ms for which the drives hold a command.
             (Content::Command, _) if share >= 1.0 => &[Cause::BusOff],
             (Content::Command, _) => &[Cause::BusOff, Cause::DriveFault],
             // A passive transmitter repeats what the others have taken.
@@ -148,10 +155,18 @@ fn of_frames(content: Content, kind: FrameFault) -> Option<&'static [Cause]> {
         (Content::Feedback, FrameFault::Delay(_)) => HELD_UP,
         (Content::Feedback, FrameFault::Jitter(_)) => &[
             Cause::Reordered,
+            Cause::Late,
             Cause::FeedbackLost,
             Cause::PeerSilent,
             Cause::DriveFault,
         ],
+        (
+            Content::Command,
+            FrameFault::Delay(_)
+            | FrameFault::Jitter(_)
+            | FrameFault::Replay(_)
+            | FrameFault::Reorder(_),
+        ) => LATE,
         (Content::Command, _) => LET_GO,
         (Content::Heartbeat(Node::Drives), _) => &[Cause::PeerSilent],
         (Content::Heartbeat(Node::Operator), _) => &[Cause::OperatorSilent],

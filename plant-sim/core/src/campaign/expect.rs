@@ -8,6 +8,7 @@
 //! | up to 3 commands lost or damaged | the same | the drives hold a command for 5 samples |
 //! | 3 feedback frames damaged in a row | 4 samples | three bad frames, and one sample to answer |
 //! | feedback or commands gone | 8 samples | the drives switch off after 5 samples without a command, seen 2 samples later, and a frame may have been on its way |
+//! | feedback or commands that stay late, by 2 ms or more | 7 samples, and twice as late | a command that is 2 ms old is late; three samples of drives that have it, each of which may be as late, and one to answer |
 //! | 4 old feedback frames in a row | 5 samples | the third repeated or old frame |
 //! | an encoder that jumps further than the following error allows | 4 samples | three samples beyond a limit, and one to answer |
 //! | every attempt to send feedback fails for up to 2 samples; what the controller receives is unreadable for as long; a node babbles | the same as without it | frames wait and are repeated: even after 32 attempts (bus-off of the drives) and 1.4 ms of recovery the next feedback is there within 5 samples |
@@ -46,6 +47,9 @@ use crate::bus::ErrorKind;
 use crate::clock::ClockDefect;
 use crate::faults::{Disguise, FrameFault, What};
 use crate::plant::defect::{EncoderDefect, MotorDefect};
+
+/// Age from which on a feedback is old: from the fault table of docs/safety.md.
+const OLD: Duration = Duration::from_millis(2);
 
 /// Noise of a sound encoder, rad and m: two of its counts at the shoulder.
 const SOUND_NOISE: f64 = 1.2e-6;
@@ -162,6 +166,25 @@ fn of(fault: &Spell, period: Period) -> Expected {
             {
                 no_survival(by_length(0, 9, 8))
             }
+            (Content::Feedback | Content::Command, FrameFault::Delay(late)) => {
+                let late = Duration::from_seconds(late);
+                let due = late * 2 + samples(7);
+                // Not less than a sample: what comes in time for the next one is not late at a low rate.
+                if late >= OLD.max(period.duration()) && lasts >= due {
+                    Expected::DetectedBy(fault.from + due)
+                } else {
+                    Expected::Either
+                }
+            }
+            (Content::Command, FrameFault::Replay(back)) => {
+                let late = period.duration() * back as u32;
+                let due = late + samples(7);
+                if late >= OLD && lasts >= due {
+                    Expected::DetectedBy(fault.from + due)
+                } else {
+                    Expected::Either
+                }
+            }
             _ => Expected::Either,
         },
         What::Attempts(info, kind, 1.0) => match (info.content, kind) {
@@ -244,6 +267,7 @@ pub(super) fn stops_under_control(cause: Cause) -> bool {
             | Cause::Overrun
             | Cause::OperatorSilent
             | Cause::Reordered
+            | Cause::Late
             | Cause::Corrupted
             | Cause::SoftLimit
             | Cause::EStop
