@@ -117,7 +117,9 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
             _ => return None,
         },
         What::Misreads(Node::Drives, _) => &[Cause::BusOff, Cause::DriveFault],
-        // After some ten error flags it is passive, and spoils nothing.
+        // After some ten error flags it is passive, and spoils nothing; one that reads the frames in between stays active, and every
+        // frame that it spoils counts for its sender.
+        What::Misreads(Node::Operator, share) if share < 1.0 => OFF_THE_BUS,
         What::Misreads(Node::Operator, _) => &[],
         What::NoRecovery(_) => &[],
         What::Clock(ClockDefect::Drift(_)) => &[],

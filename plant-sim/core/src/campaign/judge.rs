@@ -308,8 +308,8 @@ impl Judge {
         if !is_latched && (went_on || self.cut.is_none()) {
             return;
         }
-        let is_controlled = self.cut.is_none() && self.reports.ask_for_control();
-        if self.lift.is_too_low(&self.bounds, is_controlled) {
+        let controlled = self.cut.is_none() && self.reports.ask_for_control();
+        if self.lift.is_too_low(&self.bounds, controlled, &self.faults) {
             self.miss(Requirement::Drop);
         }
     }

@@ -1,6 +1,7 @@
 //! How far the lift goes down that it should not.
 
 use super::bounds::{Bounds, STANDING};
+use super::spells::Spells;
 use crate::observer::PlantState;
 
 const LIFT: usize = 2;
@@ -22,8 +23,9 @@ struct Since {
     highest: f64,
     /// Greatest speed at the detection and under torque.
     speed: f64,
-    /// How far it went below what was meant.
+    /// How far it went below what was meant, and of that under torque.
     drop: f64,
+    driven: f64,
     /// Where torque went off, since when it has stayed off.
     off: Option<f64>,
     /// How far it went down since then.
@@ -39,6 +41,7 @@ impl Lift {
             highest: place,
             speed,
             drop: 0.0,
+            driven: 0.0,
             off: None,
             sunk: 0.0,
         });
@@ -46,6 +49,7 @@ impl Lift {
         if is_driven {
             since.meant = since.meant.max(reference);
             since.speed = since.speed.max(speed);
+            since.driven = since.driven.max(place - since.meant);
             since.off = None;
             since.sunk = 0.0;
         } else {
@@ -85,16 +89,23 @@ impl Lift {
         self.since.map_or(0.0, |since| since.speed)
     }
 
-    /// Whether it went down further than these bounds have it; after a stop under control its closed brake holds it where it is.
-    pub(super) fn is_too_low(&self, bounds: &Bounds, is_controlled: bool) -> bool {
+    /// Whether it went down further than these bounds have it; after a stop under control its closed brake holds it where it is. One that
+    /// its brake does not hold goes down without torque, and that says nothing about the controller.
+    pub(super) fn is_too_low(&self, bounds: &Bounds, is_controlled: bool, faults: &Spells) -> bool {
         let allowed = bounds.drop(self.speed()) + self.pull();
+        if faults.open_the_brake() {
+            return self.since.is_some_and(|since| since.driven > allowed);
+        }
         self.drop() > allowed || (is_controlled && self.sunk() > STANDING)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use protocol::time::Period;
+
     use super::*;
+    use crate::model::RobotModel;
 
     fn at(place: f64) -> PlantState {
         PlantState {
@@ -122,5 +133,24 @@ mod tests {
             assert!((lift.drop() - 0.01).abs() < 1e-12);
         }
         assert_eq!(Lift::default().pull(), 0.0);
+    }
+
+    /// What an open brake lets fall is excused, and not what goes down under torque.
+    #[test]
+    fn an_open_brake_excuses_what_falls_without_torque() {
+        let bounds = Bounds::new(&RobotModel::irb_930_22_105(), 1e-3);
+        for (is_driven, fault, too_low) in [
+            (false, "brake:slow=0.1@0s", true),
+            (false, "brake:stuck-open@0s", false),
+            (true, "brake:slow=0.1@0s", true),
+            (true, "brake:stuck-open@0s", true),
+        ] {
+            let mut lift = Lift::default();
+            lift.follow(&at(0.1), 0.1, true);
+            lift.follow(&at(0.3), 0.1, is_driven);
+            let faults = Spells::new(&[fault.parse().unwrap()], Period::of_rate(1000.0));
+            let is = lift.is_too_low(&bounds, false, &faults);
+            assert_eq!(is, too_low, "driven {is_driven}, {fault}");
+        }
     }
 }

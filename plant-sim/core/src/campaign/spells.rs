@@ -140,8 +140,12 @@ impl Spells {
 
     /// Whether something may move an arm without torque: a spring, or the weight of a lift that nothing holds.
     pub(super) fn move_the_arm(&self) -> bool {
-        let opens = |what| matches!(what, What::Brake(BrakeDefect::StuckOpen));
-        self.catch_the_tool() || self.any(opens)
+        self.catch_the_tool() || self.open_the_brake()
+    }
+
+    /// Whether the brake may not hold, so that an arm without torque goes down.
+    pub(super) fn open_the_brake(&self) -> bool {
+        self.any(|what| matches!(what, What::Brake(BrakeDefect::StuckOpen)))
     }
 
     /// The most that may be at the flange, with this payload.
