@@ -122,7 +122,14 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
         What::Misreads(Node::Operator, share) if share < 1.0 => OFF_THE_BUS,
         What::Misreads(Node::Operator, _) => &[],
         What::NoRecovery(_) => &[],
-        What::Clock(ClockDefect::Drift(_)) => &[],
+        // All speeds and times are wrong by as much, at once: what a crystal is off by nobody feels, and hundredths look like a blow.
+        What::Clock(ClockDefect::Drift(_)) => &[
+            Cause::Collision,
+            Cause::EncoderFault,
+            Cause::FollowingError,
+            Cause::OverSpeed,
+            Cause::Chatter,
+        ],
         // A few can be told from the readings, many near each other cannot.
         What::Clock(ClockDefect::Misses(_)) => &[
             Cause::FeedbackLost,
