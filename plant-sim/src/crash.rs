@@ -14,7 +14,7 @@ use protocol::time::Instant;
 
 use crate::external::peers;
 use crate::qemu::{Channel, Options, Qemu};
-use sim::drives::{Drives, HOLD_SAMPLES};
+use sim::drives::Drives;
 use sim::observer::{Observer, Truth};
 use sim::operator::Operator;
 use sim::rig::Rig;
@@ -24,9 +24,9 @@ use sim::setup::RunConfig;
 const IN_MOTION: u32 = 90;
 /// Samples from the fault to the verdict: time for five heartbeats.
 const AFTERWARDS: u64 = 500;
-/// Most samples until the drives have switched torque off: they hold the last command for some, and a frame may be in
+/// Most samples until the drives have switched torque off: at 1 kHz they hold the last command for 5, and a frame may be in
 /// transmission.
-const LET_GO: u64 = HOLD_SAMPLES as u64 + 3;
+const LET_GO: u64 = 5 + 3;
 /// Fault status of an access that is not allowed, by an instruction or while stacking (CFSR: DACCVIOL, MSTKERR).
 const OUT_OF_STACK: u32 = 1 << 1 | 1 << 4;
 /// Speed below which the lift counts as at rest, m/s.

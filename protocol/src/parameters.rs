@@ -138,13 +138,18 @@ pub struct Default {
     /// For a corner frequency, its limit in rad per sample, so that slow sampling reduces it. Infinite for anything
     /// that does not depend on sampling.
     pub per_sample: f32,
+    /// For a number of samples, the time that they last at least, s, so that fast sampling makes them more. 0 for anything else.
+    pub lasts: f32,
 }
 
 impl Default {
     /// The value at a sampling period (s, positive).
     #[must_use]
     pub const fn at(self, period: f32) -> f32 {
-        least(self.most, self.per_sample / period)
+        let value = least(self.most, self.per_sample / period);
+        // Rounded up, but for what the period is inexact by.
+        let samples = (self.lasts / period + 0.999) as u32 as f32;
+        if samples > value { samples } else { value }
     }
 }
 

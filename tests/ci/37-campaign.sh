@@ -19,6 +19,13 @@ plant-sim campaign merge whole >whole.jsonl
 judged plant-sim campaign report whole.jsonl --picture worst.svg >/dev/null
 grep -q '</svg>' worst.svg
 
+echo "- at other rates"
+for rate in 500 2000; do
+    sed "s/\"cycles=1\"/\"cycles=1\", \"rate_hz=$rate\"/" "$campaign/default.toml" >"at-$rate.toml"
+    plant-sim campaign plan --cases "at-$rate.toml" --count 500 --seed 1 >"at-$rate.jsonl"
+    plant-sim campaign run "at-$rate.jsonl" --out "at-$rate" >/dev/null
+done
+
 echo "- in two parts, one after the other"
 for part in 0 1; do
     judged plant-sim campaign run plan.jsonl --shard $part/2 --out parts

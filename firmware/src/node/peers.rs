@@ -4,16 +4,12 @@ use protocol::codec::{self, DecodeError};
 use protocol::e2e::{Profile, Receiver};
 use protocol::frame::CanFrame;
 use protocol::messages::{Cause, DriveStatus, Fault, Message, Node as Name};
-use protocol::parameters::Store as _;
+use protocol::parameters::{DriveParameter, Store as _};
 use protocol::table;
 use protocol::time::{Duration, Instant};
 
 use super::Node;
 use crate::control::fault::{FLOOD, FLOOD_RATE};
-
-/// Feedbacks after a flood in which it is remembered: those of the samples for which drives hold a command, and of the one in which they let go, may
-/// have waited for its end.
-const FLOOD_FADES: u8 = 8;
 
 /// The heartbeat of another node. As CiA 301 has it, it is watched from the first one on that was heard.
 #[derive(Clone, Debug)]
@@ -139,7 +135,9 @@ impl Node {
     #[inline(never)]
     pub(super) fn feel_flood(&mut self, steps: u32, status: DriveStatus) {
         if self.strangers >= FLOOD {
-            (self.flood, self.flood_fades) = (self.strangers, FLOOD_FADES);
+            // Feedbacks of the samples for which drives hold a command, and of those until they have let go, may have waited for its end.
+            let held = DriveParameter::HoldSamples.initial(self.controller.period());
+            (self.flood, self.flood_fades) = (self.strangers, held as u8 + 3);
         }
         if steps > 1 || self.has_let_go(status) {
             self.blame_flood(steps as f32 * self.controller.period());

@@ -1,7 +1,7 @@
 //! The drive side of the link: samples the plant into feedback and applies commands to it.
 //!
 //! It owns the sampling clock. A command acts when it arrives, not when it was due. Without a new one the last torque is held
-//! for [`HOLD_SAMPLES`], then the drives brake and switch torque off. A command that answers an older sample is none. Once off
+//! for [`hold_samples`], then the drives brake and switch torque off. A command that answers an older sample is none. Once off
 //! for want of commands, they take torque only to stop the arm while their brake closes, and then none until a command has let
 //! go of it: one that was on its way knows nothing of that, and an arm that stands is not to move again.
 
@@ -25,8 +25,10 @@ use crate::plant::Plant;
 use crate::world::World;
 use settings::Settings;
 
-/// Default number of samples for which the last command is held without a new one.
-pub const HOLD_SAMPLES: u32 = DriveParameter::HoldSamples.initial(1.0) as u32;
+/// Default number of samples of this period (s) for which the last command is held without a new one.
+pub fn hold_samples(period: f32) -> u32 {
+    DriveParameter::HoldSamples.initial(period) as u32
+}
 
 /// Age from which on the sample that a command answers makes it late: a feedback of 2 ms before is old.
 const LATE: Duration = Duration::from_millis(2);

@@ -53,6 +53,23 @@ fn what_stays_late_is_told_as_late() {
     }
 }
 
+/// A gap of less than 5 ms is bridged above 1 kHz, too, where five samples are over sooner, and 32 attempts in vain are a bus-off.
+#[test]
+fn above_1_khz_a_command_is_held_for_as_long() {
+    for (fault, expected) in [
+        ("feedback:loss@0.4003s..+3.5ms", Cause::None),
+        ("command:loss@0.4003s..+3.5ms", Cause::None),
+        ("command:crc-error@0.4s", Cause::BusOff),
+        ("command:loss@0.4s", Cause::DriveFault),
+    ] {
+        let mut scenario = Scenario::built_in("gate").unwrap();
+        scenario.cycles = 1;
+        scenario.rate_hz = 2000.0;
+        let (_, record) = run_of(scenario, &[fault], 5);
+        assert_eq!(cause(&record), expected, "{fault}");
+    }
+}
+
 /// Nor is a burst late that a bus without room holds up for a moment, nor what two clocks make of the time.
 #[test]
 fn what_catches_up_is_not_late() {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use firmware::control::fault::MAX_GAP_MS;
 use firmware::node::PEER_TIMEOUT;
 
-use sim::drives::HOLD_SAMPLES;
+use sim::drives::hold_samples;
 
 /// Width of a class of the histogram, ns.
 const CLASS_NS: u64 = 1_000;
@@ -168,9 +168,10 @@ impl Timing {
 
     /// Watchdogs of the loop and their limits.
     pub fn limits(&self) -> [(&'static str, Duration); 4] {
+        let held = hold_samples(self.period.as_secs_f32());
         [
             ("command before the next sample", self.period),
-            ("drives hold the last torque", self.period * HOLD_SAMPLES),
+            ("drives hold the last torque", self.period * held),
             (
                 "controller bridges missing samples",
                 Duration::from_millis(u64::from(MAX_GAP_MS)),

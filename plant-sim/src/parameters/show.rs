@@ -181,6 +181,9 @@ fn row(text: &mut String, parameter: &Parameter) {
         Some(default) if rule.kind == Kind::Corner => {
             format!("{}{}", default.most, per_sample(default.per_sample))
         }
+        Some(default) if default.lasts > 0.0 => {
+            format!("{}, and at least {} ms", default.most, 1e3 * default.lasts)
+        }
         Some(default) => default.most.to_string(),
         None => String::new(),
     };

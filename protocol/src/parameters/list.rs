@@ -129,7 +129,7 @@ parameters! {
         /// Fraction of its peak torque that the wrist's motor may give.
         TorqueLimitWrist = 0x1013, "torque-limit-wrist", "", AtRest, real(0.1, 1.0, 1.0);
         /// Samples for which the last command is held without a new one; then brake and torque off.
-        HoldSamples = 0x1020, "hold-samples", "samples", Always, whole(1.0, 50.0, 5.0);
+        HoldSamples = 0x1020, "hold-samples", "samples", Always, samples(1.0, 50.0, (5.0, 5e-3));
     }
 }
 
@@ -149,6 +149,7 @@ const fn real(lower: f32, upper: f32, default: f32) -> Range {
         default: Some(Default {
             most: default,
             per_sample: f32::INFINITY,
+            lasts: 0.0,
         }),
     }
 }
@@ -157,6 +158,18 @@ const fn whole(lower: f32, upper: f32, default: f32) -> Range {
     Range {
         kind: Kind::Whole,
         ..real(lower, upper, default)
+    }
+}
+
+/// The default is a number, and the time in s that they last at least.
+const fn samples(lower: f32, upper: f32, (number, lasts): (f32, f32)) -> Range {
+    Range {
+        default: Some(Default {
+            most: number,
+            per_sample: f32::INFINITY,
+            lasts,
+        }),
+        ..whole(lower, upper, number)
     }
 }
 
@@ -173,7 +186,11 @@ const fn corner(lower: f32, upper: f32, (most, per_sample): (f32, f32)) -> Range
         kind: Kind::Corner,
         lower,
         upper,
-        default: Some(Default { most, per_sample }),
+        default: Some(Default {
+            most,
+            per_sample,
+            lasts: 0.0,
+        }),
     }
 }
 

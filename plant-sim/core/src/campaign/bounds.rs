@@ -33,9 +33,11 @@ const RANGE_MARGIN: [f64; 4] = [0.02, 0.02, 0.002, 0.05];
 const SPEED_FACTOR: f64 = 1.1;
 /// Consecutive samples beyond a limit until it is reported, the sample of the answer included.
 const SAMPLES_TO_REPORT: u32 = 4;
-/// Samples from a report until the brake is told at the latest: the drives hold a command for 5 samples, and a stop that an axis does
-/// not follow is given up at the 4th sample.
-const SAMPLES_TO_BRAKE: f64 = 8.0;
+/// From a report until the brake is told at the latest: the drives hold a command for 5 samples, and 5 ms at least, and a stop that an axis
+/// does not follow is given up at the 4th sample.
+fn to_brake_s(period: f64) -> f64 {
+    (5.0 * period).max(0.005) + 3.0 * period
+}
 /// For a stop that uses 0.95 of the torque, builds it up at half its rate, and has more axes to stop than one.
 const STOP_MARGIN: f64 = 1.25;
 /// The brake closes within this, s.
@@ -164,12 +166,12 @@ impl Bounds {
 
     /// Longest time from a report until torque is off, s.
     pub fn torque_off_s(&self) -> f64 {
-        self.stop_s() + BRAKE_WAIT_S + SAMPLES_TO_BRAKE * self.period
+        self.stop_s() + BRAKE_WAIT_S + to_brake_s(self.period)
     }
 
     /// Longest time from the command to close the brake until one that stays open is reported.
     pub fn brake_told(&self) -> Duration {
-        Duration::from_seconds(BRAKE_WAIT_S + SAMPLES_TO_BRAKE * self.period)
+        Duration::from_seconds(BRAKE_WAIT_S + to_brake_s(self.period))
     }
 
     /// Longest time of a controlled stop, s.
@@ -201,11 +203,7 @@ impl Bounds {
         let weight = self.lifted() * gravity;
         // The last torque that was commanded may be the greatest, downwards.
         let driven = effort + weight;
-        let (held, fastest) = fall(
-            speed.max(0.0),
-            driven / mass,
-            SAMPLES_TO_BRAKE * self.period,
-        );
+        let (held, fastest) = fall(speed.max(0.0), driven / mass, to_brake_s(self.period));
         let (fallen, fastest) = fall(fastest, gravity, BRAKE_S);
         // The weaker of the two that can stop it.
         let holding = effort.min(Brake::new(effort).capacity());

@@ -5,9 +5,9 @@
 //! |---|---|---|
 //! | nothing; noise of a sound encoder; frames doubled | the scenario ends as without it | no reason to stop |
 //! | up to 2 feedback frames lost or damaged | the same | a gap of 5 ms is bridged, three bad frames stop |
-//! | up to 3 commands lost or damaged | the same | the drives hold a command for 5 samples |
+//! | up to 3 commands lost or damaged | the same | the drives hold a command for 5 samples, and 5 ms at least |
 //! | 3 feedback frames damaged in a row | 4 samples | three bad frames, and one sample to answer |
-//! | feedback or commands gone | 8 samples | the drives switch off after 5 samples without a command, seen 2 samples later, and a frame may have been on its way |
+//! | feedback or commands gone | 8 samples, above 1 kHz 5 ms and 3 samples | the drives switch off after 5 samples, and 5 ms at least, without a command, seen 2 samples later, and a frame may have been on its way |
 //! | feedback or commands that stay late, by 2 ms or more | 7 samples, and twice as late | a command that is 2 ms old is late; three samples of drives that have it, each of which may be as late, and one to answer |
 //! | 4 old feedback frames in a row | 5 samples | the third repeated or old frame |
 //! | an encoder that jumps further than the following error allows | 4 samples | three samples beyond a limit, and one to answer |
@@ -27,6 +27,8 @@
 //! | heartbeats of drives or operator gone for up to 100 ms | the same as without it | the next one is there after 200 ms at most |
 //! | the same for 350 ms or more; the operator silent for as long | 250 ms and 13 samples | one that was heard is waited for so long, looked at in every tenth sample |
 //! | nobody tells a CAN controller to recover | the same as without it | nothing by itself: only after a bus-off |
+//!
+//! What is detected within 8 samples because the drives let go takes 5 ms and 3 samples above 1 kHz, of a fault that lasts for a sample more.
 //!
 //! | a motor that gives its peak torque for 600 ms or more | 600 ms | no plan accelerates for longer than 0.47 s |
 //!
@@ -60,8 +62,12 @@ const SOUND_CLOCK: f64 = 1e-4;
 /// From rest to full speed at peak torque takes the slowest axis 0.47 s; as long a plan may do the same. Then 100 ms lead away from it.
 const RUNAWAY: Duration = Duration::from_millis(600);
 
-/// Samples for which the drives hold a command.
-pub(super) const HOLD_SAMPLES: u32 = 5;
+/// Samples for which the drives hold a command: 5, and 5 ms at least.
+pub(super) fn held(period: Period) -> u32 {
+    // Rounded up, but for what a period in whole nanoseconds is off by.
+    let enough = 0.005 / period.duration().seconds() + 0.999;
+    (enough as u32).max(5)
+}
 
 /// What has to follow from a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,6 +119,9 @@ fn of(fault: &Spell, period: Period) -> Expected {
             Expected::Either
         }
     };
+    // Nothing gets through: by then the drives have let go, and have said so.
+    let silent = held(period) + 3;
+    let gone = |few| by_length(few, silent + 1, silent);
     // A heartbeat comes every 100 ms, and is waited for for 250.
     let of_heart = || {
         if lasts <= Duration::from_millis(100) {
@@ -131,22 +140,22 @@ fn of(fault: &Spell, period: Period) -> Expected {
         {
             no_survival(by_length(0, 17, 16))
         }
-        What::Silent(Node::Drives) => by_length(2, 9, 8),
-        What::Silent(Node::Controller) | What::Dead(_) => no_survival(by_length(0, 9, 8)),
+        What::Silent(Node::Drives) => gone(2),
+        What::Silent(Node::Controller) | What::Dead(_) => no_survival(gone(0)),
         What::Slow(seconds) if Duration::from_seconds(seconds) >= period.duration() => {
-            no_survival(by_length(0, 14, 13))
+            no_survival(by_length(0, silent + 6, silent + 5))
         }
-        What::Babbling(_) => by_length(2, 9, 8),
-        What::Wires(_) => no_survival(by_length(2, 9, 8)),
+        What::Babbling(_) => gone(2),
+        What::Wires(_) => no_survival(gone(2)),
         What::Motor(_, MotorDefect::Runaway) if lasts >= RUNAWAY => {
             Expected::DetectedBy(fault.from + RUNAWAY)
         }
         What::Motor(_, MotorDefect::Dip) => no_survival(by_length(0, 2, 4)),
-        What::Clock(ClockDefect::Misses(1.0)) => no_survival(by_length(0, 9, 8)),
+        What::Clock(ClockDefect::Misses(1.0)) => no_survival(gone(0)),
         What::Clock(ClockDefect::Drift(share)) if share.abs() <= SOUND_CLOCK => Expected::Survived,
         What::Frames(info, kind) => match (info.content, kind) {
             (_, FrameFault::Duplicate) => Expected::Survived,
-            (Content::Feedback, FrameFault::Loss(1.0)) => by_length(2, 9, 8),
+            (Content::Feedback, FrameFault::Loss(1.0)) => gone(2),
             (Content::Feedback, FrameFault::Corrupt(1.0) | FrameFault::BadValue(1.0)) => {
                 by_length(2, 4, 4)
             }
@@ -160,11 +169,11 @@ fn of(fault: &Spell, period: Period) -> Expected {
             (
                 Content::Command,
                 FrameFault::Loss(1.0) | FrameFault::Corrupt(1.0) | FrameFault::BadValue(1.0),
-            ) => by_length(3, 9, 8),
+            ) => gone(3),
             (Content::Feedback | Content::Command, FrameFault::Delay(late))
-                if Duration::from_seconds(late) >= samples(9) =>
+                if Duration::from_seconds(late) >= samples(silent + 1) =>
             {
-                no_survival(by_length(0, 9, 8))
+                no_survival(gone(0))
             }
             (Content::Feedback | Content::Command, FrameFault::Delay(late)) => {
                 let late = Duration::from_seconds(late);
@@ -188,13 +197,13 @@ fn of(fault: &Spell, period: Period) -> Expected {
             _ => Expected::Either,
         },
         What::Attempts(info, kind, 1.0) => match (info.content, kind) {
-            (Content::Command, ErrorKind::Ack) => by_length(2, 9, 9),
-            (Content::Command, _) => or_bus_off(by_length(2, 9, 8)),
-            (Content::Feedback, _) => by_length(2, 9, 8),
+            (Content::Command, ErrorKind::Ack) => by_length(2, silent + 1, silent + 1),
+            (Content::Command, _) => or_bus_off(gone(2)),
+            (Content::Feedback, _) => gone(2),
             _ => Expected::Either,
         },
-        What::Misreads(Node::Drives, 1.0) => or_bus_off(by_length(2, 9, 8)),
-        What::Misreads(Node::Controller, 1.0) => by_length(2, 9, 8),
+        What::Misreads(Node::Drives, 1.0) => or_bus_off(gone(2)),
+        What::Misreads(Node::Controller, 1.0) => gone(2),
         What::NoRecovery(_) => Expected::Survived,
         What::Encoder(axis, EncoderDefect::Jump(by)) if by.abs() > 2.0 * FOLLOWING_ERROR[axis] => {
             no_survival(by_length(0, 4, 4))
@@ -253,7 +262,7 @@ pub(super) fn lateness(faults: &[Spell], period: Period) -> Duration {
 
 /// How old the sample may be that a command answers: from docs/protocol.md, and the one that is under way.
 pub(super) fn is_taken(period: Period) -> Duration {
-    period.duration() * (HOLD_SAMPLES + 1)
+    period.duration() * (held(period) + 1)
 }
 
 /// Causes that leave the loops to be trusted: the arm has stopped before the brake closes, and the brake has closed before torque goes

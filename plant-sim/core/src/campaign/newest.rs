@@ -3,7 +3,7 @@
 use protocol::messages::{Command, ControlWord, DriveStatus};
 use protocol::time::{Duration, Instant, Period};
 
-use super::expect::{HOLD_SAMPLES, is_taken};
+use super::expect::{held, is_taken};
 
 /// A command that is older than the newest by so many samples answers drives that have started anew.
 const RESTARTED: u32 = 100;
@@ -69,7 +69,7 @@ impl Newest {
 
     /// Whether at this time (s) it is still obeyed, and lets the motors have torque.
     pub(super) fn enables_torque(&self, now: f64) -> bool {
-        let hold = f64::from(HOLD_SAMPLES) * self.period.duration().seconds();
+        let hold = f64::from(held(self.period)) * self.period.duration().seconds();
         now - self.time.seconds() < hold && self.control.contains(ControlWord::TORQUE_ENABLE)
     }
 }
