@@ -361,14 +361,6 @@ fn a_stop_without_a_fault_has_no_time_of_detection() {
     assert_eq!(verdict.standstill_ms, None);
 }
 
-/// An operator who reads one frame in two stays error active, and takes the controller off the bus, which tells just that.
-#[test]
-fn whoever_spoils_the_frames_of_others_may_be_told_as_their_bus_off() {
-    let verdict = judge("operator:misread=0.5@0.4s", 2.0, None);
-    assert_eq!(verdict.detected.as_deref(), Some("bus-off"));
-    assert!(verdict.missed.is_empty(), "{verdict:?}");
-}
-
 /// What is told at 0.5 s is not the fault of 0.7 s, whatever that may lead to.
 #[test]
 fn what_is_told_before_the_fault_begins_is_a_false_alarm() {

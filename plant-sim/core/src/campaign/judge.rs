@@ -160,8 +160,7 @@ impl Judge {
     /// The verdict.
     pub fn finish(mut self) -> Verdict {
         let onset = self.faults.onset().seconds();
-        let told = self.reports.told();
-        let has_begun = self.faults.onset() < Instant::MAX;
+        let (told, has_begun) = (self.reports.told(), self.faults.onset() < Instant::MAX);
         let since = |time: f64| has_begun.then(|| round((time - onset) * 1e3));
         self.judge_fall();
         let is_latched = self.reports.latched().is_some();
@@ -170,7 +169,8 @@ impl Judge {
         self.missed
             .extend(self.faults.judge_told(told, was_off, is_well));
         let end = self.last.map_or(0.0, |last| last.t);
-        if is_latched && !self.faults.leave_the_brake_open() && self.newest.enables_torque(end) {
+        let may_be_on = self.faults.keep_torque_on(self.cut.is_some());
+        if is_latched && !may_be_on && self.newest.enables_torque(end) {
             self.miss(Requirement::Standstill);
         }
         let stopped = self.detected.is_some();

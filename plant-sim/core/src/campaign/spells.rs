@@ -121,6 +121,12 @@ impl Spells {
         })
     }
 
+    /// Whether torque may be commanded for longer than a stop takes: to hold a lift whose brake is open, or as the time of the brake is
+    /// counted in ticks that the drives miss, which then have let go by a clock of their own.
+    pub(super) fn keep_torque_on(&self, have_let_go: bool) -> bool {
+        self.leave_the_brake_open() || (have_let_go && self.lose_count())
+    }
+
     /// Whether the number of a sample may not tell its time.
     pub(super) fn lose_count(&self) -> bool {
         self.any(|what| matches!(what, What::Clock(_) | What::Dead(Node::Drives)))
