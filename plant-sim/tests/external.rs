@@ -185,14 +185,15 @@ fn example(kind: &Kind) -> String {
     format!("{place}{axis}:{}{value}@{window}", kind.name)
 }
 
-/// What differs with an external controller in lock-step: its time stands still where no feedback arrives that it can read, and nobody tells it of a
+/// What differs with an external controller in lock-step: its time stands still where no new feedback arrives that it can read, and nobody tells it of a
 /// bus-off of the simulated bus, nor that it is slow. As docs/faults.md says.
-const DIFFERENT: [&str; 18] = [
+const DIFFERENT: [&str; 19] = [
     "loss",
     "delay",
     "jitter",
     "corrupt",
     "bad-value",
+    "replay",
     "bit-error",
     "stuff-error",
     "form-error",

@@ -246,8 +246,12 @@ impl Monitor {
         [qd, last_qd, disturbance, error, wanted]: [&Vector4<f32>; 5],
     ) -> Felt {
         if self.collision_count == 0 {
-            // Of two in a row, the second is where the observer began anew.
-            if self.missed(readings, qd, last_qd) || self.missed(readings, last_qd, qd) {
+            // As fast as in the last sample, or, where it speeds up, as its reference. Of two in a row, the second is where the observer began
+            // anew.
+            let expected = [last_qd * 2.0, wanted * 3.0 - last_qd];
+            if expected.iter().any(|it| self.missed(readings, qd, it))
+                || self.missed(readings, last_qd, &(qd * 2.0))
+            {
                 return Felt::Missed;
             }
             (self.velocity_felt, self.wanted) = (readings.velocity, *wanted);
@@ -298,13 +302,13 @@ impl Monitor {
     }
 
     /// Whether the drives have left out a sample before this one without counting it, as when their clock has missed a tick: then every axis has
-    /// moved twice as far as in the last one. More would look like too many jumps of an encoder.
-    fn missed(&self, readings: &Readings, qd: &Vector4<f32>, last_qd: &Vector4<f32>) -> bool {
-        let last = last_qd.component_div(&self.speed);
+    /// moved as far as it was `expected` to in two, as velocities of one sample. More would look like too many jumps of an encoder.
+    fn missed(&self, readings: &Readings, qd: &Vector4<f32>, expected: &Vector4<f32>) -> bool {
+        let expected = expected.component_div(&self.speed);
         let found = qd.component_div(&self.speed);
-        let off = found - last * 2.0;
+        let off = found - expected;
         let is_alike = off.dot(&off) < ALIKE * found.dot(&found);
-        let moves = last.dot(&last) > SLOW * SLOW;
+        let moves = expected.dot(&expected) > 4.0 * SLOW * SLOW;
         readings.steps == 1 && readings.is_measured() && moves && is_alike
     }
 

@@ -189,6 +189,7 @@ const ROUND_EIGHTHS: f32 = ROUND / 8.0;
 const MIDDLE: i32 = 64;
 
 /// For each eighth of a unit the coefficients of r^0 to r^3 of tanh around it, |r| <= 1/16.
+#[allow(clippy::indexing_slicing, reason = "evaluated by the compiler")]
 static TANH: [[f32; 4]; 2 * MIDDLE as usize] = {
     const TANH_EIGHTH: f64 = 0.124_353_001_771_596_2;
     let mut table = [[-1.0, 0.0, 0.0, 0.0]; 2 * MIDDLE as usize];

@@ -180,31 +180,6 @@ fn torque_holds_the_lift_until_the_brake_has_closed() {
     }
 }
 
-/// Drives that have let go take torque again for a stop: it builds up in half of the time of the brake, 30 samples. The weight of lift and
-/// shaft on motor 3 is m g / (2 pi / 25 mm).
-#[test]
-fn torque_that_drives_take_again_for_a_stop_builds_up() {
-    let carried = -1.95 * 9.81 / (std::f32::consts::TAU / 0.025);
-    let mut bench = Bench::with(by_itself());
-    bench.enable();
-    assert!((bench.command().torque[2] - carried).abs() < 1e-3);
-    bench.obeys = false;
-    bench.run(5);
-    assert_eq!(bench.node.controller().cause(), Cause::DriveFault);
-    bench.obeys = true;
-    // The command that they take again is the last one before they say so.
-    for sample in 2..50 {
-        let command = bench.command();
-        let built_up = carried * (sample as f32 / 30.0).min(1.0);
-        assert_eq!(command.control, BRAKE);
-        let found = command.torque[2];
-        assert!(
-            (found - built_up).abs() < 2e-3,
-            "{sample}: {found} N m, {built_up}"
-        );
-    }
-}
-
 /// An emergency stop keeps its cause: that the brake does not close is told all the same, once.
 #[test]
 fn a_brake_that_does_not_close_after_an_emergency_stop_is_told() {

@@ -46,7 +46,7 @@ const EACH_CYCLE: u64 = 5;
 const FAULTS: [Option<&str>; 12] = [
     None,
     Some("feedback:loss=0.01@0.1s"),
-    Some("feedback:delay=0.002@0.1s"),
+    Some("feedback:delay=0.001@0.1s"),
     Some("feedback:duplicate@0.1s"),
     Some("feedback:reorder@0.1s"),
     Some("command:replay@0.1s"),

@@ -211,7 +211,7 @@ fn a_fault_waits_for_another() {
     assert!(opened.is_some());
 }
 
-/// The second jump begins at 0.47 s.
+/// The second jump begins at 0.475 s.
 #[test]
 fn a_window_that_would_end_before_it_begins_does_not_come() {
     let mut scenario = Scenario::built_in("gate").unwrap();
@@ -220,7 +220,7 @@ fn a_window_that_would_end_before_it_begins_does_not_come() {
     for (fault, times) in [
         ("motor:lift:dead@jump2+200ms..0.1s", 0),
         ("motor:lift:dead@jump2..300samples", 0),
-        ("motor:lift:dead@jump2..0.471s", 1),
+        ("motor:lift:dead@jump2..0.477s", 1),
     ] {
         let (summary, record) = run_of(scenario.clone(), &[fault], 0);
         let injected = &summary.injected[0];

@@ -105,12 +105,7 @@ impl Controller {
         }
         // Drives that missed commands have switched off by themselves, and nobody else says so. After too long a gap in the feedback, the
         // stop goes on with them.
-        let is_on = readings.status.contains(DriveStatus::TORQUE_ON);
-        self.drives_on |= is_on;
-        if self.drives_on && !is_on {
-            // They may take it again for the stop: from nothing, as in enabling.
-            self.built_up = 0.0;
-        }
+        self.drives_on |= readings.status.contains(DriveStatus::TORQUE_ON);
         let has_torque = self.expects_torque() && readings.steps <= self.max_gap;
         if let Some(fault) = Monitor::status(readings.status, has_torque) {
             self.fail(fault);
