@@ -19,9 +19,11 @@ use protocol::messages::{Cause, Command, ControlWord, Message};
 use protocol::time::{Duration, Instant};
 use sim::campaign::case::{Case, Crossing, Situation};
 use sim::campaign::trial;
-use sim::campaign::verdict::Verdict;
+use sim::campaign::verdict::{Requirement, Verdict};
 use sim::controller::InProcess;
+use sim::faults::{Fault, What};
 use sim::peer::{Outbox, Peer, PeerError};
+use sim::plant::defect::EncoderDefect;
 use sim::scenario::{Change, Scenario, built_in};
 use sim::setup::RunConfig;
 use sim::world::World;
@@ -207,6 +209,15 @@ const OUT_OF_REACH: [(Cause, &str); 2] = [
     ),
 ];
 
+/// What docs/safety.md does not promise: an encoder that gets stuck while its axis stands is felt with the next move, and this is the last one.
+/// No row has spoken, so none is judged by such a case.
+fn stands_unseen(case: &Case, verdict: &Verdict) -> bool {
+    let is_stuck = |fault: &Fault| matches!(fault.what, What::Encoder(_, EncoderDefect::Stuck));
+    case.faults.iter().all(is_stuck)
+        && verdict.detected.is_none()
+        && verdict.missed.iter().eq([&Requirement::Reported])
+}
+
 /// Rows that cases reach which are aimed at them.
 const AIMED_AT: [Cause; 4] = [
     Cause::SoftLimit,
@@ -226,7 +237,10 @@ fn a_row_that_is_missing_is_found_by_cases_drawn_at_random() {
     let verdicts = [sound(&all), sound(&aimed)];
     for (draw, verdicts) in [&all, &aimed].into_iter().zip(&verdicts) {
         for (case, verdict) in draw.cases.iter().zip(verdicts) {
-            assert!(verdict.missed.is_empty(), "{case:?}: {verdict:?}");
+            assert!(
+                verdict.missed.is_empty() || stands_unseen(case, verdict),
+                "{case:?}: {verdict:?}"
+            );
         }
     }
     for row in &REACTIONS {
