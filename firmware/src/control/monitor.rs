@@ -264,34 +264,36 @@ impl Monitor {
         let axis = most_beyond(disturbance, &self.collision).unwrap_or(axis);
         let (before, now) = (self.wanted, wanted);
         let slow = self.speed * SLOW;
-        let was_to_move = |axis: &Axis| axis.of(&before).abs() > axis.of(&slow);
-        let mut moving = Axis::ALL.into_iter().filter(was_to_move);
-        let stands = moving.clone().chain([axis]);
-        let is_still = |axis: &Axis| readings.stays_still(*axis, axis.of(&self.velocity_felt));
-        let turned = |axis: &Axis| {
+        let was_to_move = |axis: Axis| axis.of(&before).abs() > axis.of(&slow);
+        let is_still = |axis: Axis| readings.stays_still(axis, axis.of(&self.velocity_felt));
+        let is_back = |axis: Axis| {
             let (before, now, found) = (axis.of(&before), axis.of(now), axis.of(qd));
-            now * before > 0.0 && found * before < -BACK * before * before
+            was_to_move(axis) && now * before > 0.0 && found * before < -BACK * before * before
         };
+        let stands = Axis::ALL.map(|it| is_still(it) && (it == axis || was_to_move(it)));
         // Away from its reference, and not ahead of it on the same way.
         let is_away = (axis.of(qd) - axis.of(now)).abs() > 0.5 * axis.of(qd).abs();
-        Felt::Fault(
-            if let Some(axis) = self.farthest(stands.filter(is_still), error) {
-                of_axis(Cause::StuckSensor, axis, error, &Vector4::zeros())
-            } else if let Some(first) = moving.find(turned)
-                && let Some(axis) = self.farthest(moving.filter(turned).chain([first, axis]), error)
-            {
-                of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
-            } else if is_away && readings.runs_away(axis, axis.of(&self.velocity_felt)) {
-                of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
-            } else {
-                of_axis(Cause::Collision, axis, disturbance, &self.collision)
-            },
-        )
+        Felt::Fault(if let Some(axis) = self.farthest(stands, error) {
+            of_axis(Cause::StuckSensor, axis, error, &Vector4::zeros())
+        } else if Axis::ALL.into_iter().any(is_back)
+            && let went_back = Axis::ALL.map(|it| it == axis || is_back(it))
+            && let Some(axis) = self.farthest(went_back, error)
+        {
+            of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
+        } else if is_away && readings.runs_away(axis, axis.of(&self.velocity_felt)) {
+            of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
+        } else {
+            of_axis(Cause::Collision, axis, disturbance, &self.collision)
+        })
     }
 
     /// Of these axes the one that is farthest off its reference, as a share of what it may be: a faulty axis shakes the others.
-    fn farthest(&self, axes: impl Iterator<Item = Axis>, error: &Vector4<f32>) -> Option<Axis> {
+    // Out of line, for the size of two copies.
+    #[inline(never)]
+    fn farthest(&self, is_one: [bool; 4], error: &Vector4<f32>) -> Option<Axis> {
         let share = error.component_div(&self.following_error).abs();
+        let axes = Axis::ALL.into_iter().zip(is_one);
+        let axes = axes.filter_map(|(axis, is_one)| is_one.then_some(axis));
         axes.reduce(|one, other| {
             if other.of(&share) > one.of(&share) {
                 other

@@ -106,6 +106,8 @@ pub struct Pose {
 }
 
 /// Pose of the flange at joint position `q` (paper, eq. 8 to 19), yaw in (-pi, pi].
+// Out of line, for the size of four copies.
+#[inline(never)]
 #[must_use]
 pub fn forward(geometry: &Geometry, q: &Vector4<f32>) -> Pose {
     forward_with(geometry, &Trig::new(q), q)

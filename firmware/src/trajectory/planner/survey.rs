@@ -170,6 +170,8 @@ fn farthest(here: &PathPoint, s: f32, reach: f32) -> Vector4<f32> {
 
 /// The speed along the path at which the first joint reaches its limit, given the joints' travel per unit of path; huge
 /// where nothing moves.
+// Out of line, for the size of its copies.
+#[inline(never)]
 pub(super) fn fill(limit: &Vector4<f32>, travel: &Vector4<f32>) -> f32 {
     limit
         .iter()
