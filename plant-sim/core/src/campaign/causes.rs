@@ -101,7 +101,8 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
         // Drives that start anew begin with sample 0, and without torque.
         What::Dead(Node::Drives) => &[Cause::DriveFault, Cause::FeedbackLost, Cause::PeerSilent],
         What::Dead(_) => &[],
-        What::Slow(_) => &[Cause::Overrun, Cause::DriveFault],
+        // The drives may see before the controller's own clock does that its answers are late.
+        What::Slow(_) => &[Cause::Overrun, Cause::Late, Cause::DriveFault],
         // No node hears itself.
         What::Babbling(Node::Controller) => HELD_UP,
         What::Babbling(_) => &[Cause::Babbling],
