@@ -91,7 +91,7 @@ for way in lock-step real-time; do
     if [ $way = lock-step ]; then
         has_said "fault: peer silent" || fail "the controller did not notice"
         # The twin knows nothing of the pause, and the first frame that differs ends the run, in mid-motion.
-        ended plant-stands "differs from its twin"
+        ended plant-stands "this process has stood still"
         # Often before it has sent anything that is answered.
         no_torque continued 0
     else
