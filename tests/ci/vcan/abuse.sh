@@ -90,8 +90,9 @@ for way in lock-step real-time; do
     kill -CONT $plant 2>/dev/null || true
     if [ $way = lock-step ]; then
         has_said "fault: peer silent" || fail "the controller did not notice"
-        # The twin knows nothing of the pause, and the first frame that differs ends the run, in mid-motion.
-        ended plant-stands "this process has stood still"
+        # The twin knows nothing of the pause, and the first frame that differs ends the run, in mid-motion; a plant that was stopped while it
+        # waited for an answer has given it up, and hears what became of the controller.
+        ended plant-stands "this process has stood still\|went to fault: peer silent"
         # Often before it has sent anything that is answered.
         no_torque continued 0
     else
