@@ -1,6 +1,6 @@
 //! Lock-step: the plant waits for each answer.
 
-use std::time;
+use std::{iter, time};
 
 use firmware::control::controller::Config;
 use link::LinkAddress;
@@ -93,21 +93,24 @@ impl LockStep {
         self.begun = true;
         self.remote.refuse_restart(frame, self.twin.node())?;
         if self.follows {
-            self.twin.compare(frame).map_err(|difference| {
-                if misses_a_peer(frame) {
-                    return self.remote.error(format!(
+            if let Err(difference) = self.twin.compare(frame) {
+                // What it says of the plant may come behind its answer to a request.
+                let link = &mut self.remote.link;
+                let mut rest = iter::once(*frame).chain(iter::from_fn(|| link.receive()));
+                if rest.any(|frame| misses_a_peer(&frame)) {
+                    return Err(self.remote.error(format!(
                         "has missed the plant {}, and says peer-silent: this process has stood still meanwhile, stopped or on a \
                          computer with too much to do, and the time of a controller in another one goes on",
                         self.place()
-                    ));
+                    )));
                 }
-                self.remote.error(format!(
+                return Err(self.remote.error(format!(
                     "differs from its twin in this process {}: {difference}. Both must be built from the same source and \
                      have the same robot (--model) and rate (--rate); a controller in real time needs a plant in real \
                      time (--real-time)",
                     self.place()
-                ))
-            })?;
+                )));
+            }
         } else if command {
             self.twin.due().clear();
         }
