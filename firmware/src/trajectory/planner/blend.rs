@@ -18,9 +18,9 @@
 
 use nalgebra::Vector4;
 
+use super::verify::Before;
 use super::{Planner, Stage};
 use crate::mechanics::arm::Geometry;
-use crate::mechanics::body::Torques;
 use crate::mechanics::jacobian::Jacobian;
 use crate::mechanics::kinematics::{self, Trig};
 use crate::mechanics::math::{least, sqrt};
@@ -61,6 +61,7 @@ pub(super) struct Blend {
     instant: f32,
     /// What is known of it.
     motion: Motion,
+    /// The instant before, in the time of the overlap.
     before: Option<Before>,
 }
 
@@ -72,17 +73,6 @@ enum Motion {
     First(Reference),
     /// Of both together.
     Both(Reference),
-}
-
-/// An instant, for the one after it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Before {
-    /// Its time in the overlap, s.
-    t: f32,
-    /// Torques without Coulomb friction.
-    torque: Torques,
-    /// Joint accelerations.
-    qdd: Vector4<f32>,
 }
 
 impl Planner {

@@ -28,15 +28,15 @@ pub(super) fn share(draft: &Trajectory) -> f32 {
     }
 }
 
-/// A sample of the last pass, for the one after it.
+/// A sample of the last pass or of an overlap, for the one after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Before {
     /// Its time, s.
-    t: f32,
+    pub(super) t: f32,
     /// Torques without Coulomb friction.
-    torque: Torques,
+    pub(super) torque: Torques,
     /// Joint accelerations.
-    qdd: Vector4<f32>,
+    pub(super) qdd: Vector4<f32>,
 }
 
 impl Planner {
