@@ -11,9 +11,7 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use serde::Serialize;
 use serde::de::IgnoredAny;
-use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 use sim::curves::Drawing;
 
@@ -46,13 +44,6 @@ const RUNS: [&str; 2] = [
     "]</script>",
 ];
 
-/// Content of a page about a run.
-#[derive(Serialize)]
-struct About<'a> {
-    results: Value,
-    drawing: &'a Drawing,
-}
-
 /// The page about a run with `results`.
 pub fn page(results: &Results, drawing: &Drawing) -> String {
     let name = &results.summary.recipe.scenario;
@@ -61,9 +52,11 @@ pub fn page(results: &Results, drawing: &Drawing) -> String {
     if let Some(members) = results.as_object_mut() {
         members.remove("each_cycle");
     }
-    let about = About { results, drawing };
-    let json = serde_json::to_string(&about).expect("numbers and texts are JSON");
-    of_runs(name, &[json])
+    let drawing = drawing.json();
+    of_runs(
+        name,
+        &[format!(r#"{{"results":{results},"drawing":{drawing}}}"#)],
+    )
 }
 
 /// Why two runs cannot be compared.

@@ -88,6 +88,14 @@ pub struct Drawing {
     robot: Robot,
 }
 
+impl Drawing {
+    /// As JSON, in one line: a megabyte, which is why it is written here, where code is optimised.
+    #[must_use]
+    pub fn json(&self) -> String {
+        serde_json::to_string(self).expect("numbers and texts are JSON")
+    }
+}
+
 /// Lengths and limits that are drawn; see [`crate::model`] for units.
 #[derive(Clone, Debug, Serialize)]
 pub struct Robot {

@@ -17,6 +17,11 @@ use super::{
 pub struct Writer<W: Write> {
     sink: W,
     interface: Interface,
+    text: Text,
+}
+
+/// What is written, without where to: compiled once and here, whatever the sink is.
+struct Text {
     hash: Sha256,
     line: Line,
 }
@@ -27,8 +32,10 @@ impl<W: Write> Writer<W> {
         Self {
             sink,
             interface,
-            hash: Sha256::new(),
-            line: Line::default(),
+            text: Text {
+                hash: Sha256::new(),
+                line: Line::default(),
+            },
         }
     }
 
@@ -63,6 +70,31 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// Those of the sink.
     pub fn record(&mut self, record: &Record) -> io::Result<()> {
+        self.sink.write_all(self.text.line_of(record))?;
+        self.text.keep();
+        Ok(())
+    }
+
+    /// Flushes the sink.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.sink.flush()
+    }
+
+    /// Flushes the sink and returns it with the hash of everything written.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn finish(mut self) -> io::Result<(W, LogHash)> {
+        self.sink.flush()?;
+        Ok((self.sink, self.text.hash()))
+    }
+}
+
+impl Text {
+    fn line_of(&mut self, record: &Record) -> &[u8] {
         let line = &mut self.line;
         line.clear();
         line.byte(b'(');
@@ -86,26 +118,16 @@ impl<W: Write> Writer<W> {
             Some(Direction::Transmitted) => line.extend(b" T"),
         }
         line.byte(b'\n');
-        self.sink.write_all(line.bytes())?;
-        self.hash.update(line.bytes());
-        Ok(())
+        line.bytes()
     }
 
-    /// Flushes the sink.
-    ///
-    /// # Errors
-    /// Those of the sink.
-    pub fn flush(&mut self) -> io::Result<()> {
-        self.sink.flush()
+    /// Takes the line into the hash.
+    fn keep(&mut self) {
+        self.hash.update(self.line.bytes());
     }
 
-    /// Flushes the sink and returns it with the hash of everything written.
-    ///
-    /// # Errors
-    /// Those of the sink.
-    pub fn finish(mut self) -> io::Result<(W, LogHash)> {
-        self.sink.flush()?;
-        Ok((self.sink, LogHash(self.hash.finalize().into())))
+    fn hash(self) -> LogHash {
+        LogHash(self.hash.finalize().into())
     }
 }
 
