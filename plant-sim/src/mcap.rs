@@ -15,7 +15,7 @@ use foxglove::Encode;
 use foxglove::messages::Timestamp;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
-use mcap::{Compression, McapError, WriteOptions};
+use mcap::{McapError, WriteOptions};
 use nalgebra::Vector4;
 use protocol::codec;
 use protocol::frame::CanFrame;
@@ -48,8 +48,9 @@ impl<W: Write> Recorder<W> {
     /// Those of the sink.
     pub fn new(sink: W, model: &RobotModel) -> io::Result<Self> {
         let options = WriteOptions::new()
-            // A third more bytes than with zstd, whose library takes half a minute to compile; every first run would pay that.
-            .compression(Some(Compression::Lz4))
+            // The libraries of lz4 and zstd take longer to compile than all else here needs for it, and every first run would
+            // pay that; `mcap compress` makes a third of the bytes.
+            .compression(None)
             .disable_seeking(true)
             .library(concat!("plant-sim ", env!("CARGO_PKG_VERSION")));
         let arm = ArmModel::from(model);

@@ -181,8 +181,7 @@ impl Qemu {
     pub fn take_log(&mut self) -> Result<String, String> {
         self.say_goodbye();
         let bytes = self.board.take_log().map_err(|error| error.to_string())?;
-        let image = std::fs::read(&self.image).map_err(|error| error.to_string())?;
-        log::decode(&image, &bytes)
+        log::read(&self.image, bytes)
     }
 
     /// Asks the board to call the node once.

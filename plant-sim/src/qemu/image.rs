@@ -43,28 +43,46 @@ pub(super) fn no_emulator(error: &io::Error) -> PeerError {
 }
 
 fn build(program: &str) -> Result<PathBuf, PeerError> {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/board/cargo");
-    if !script.exists() {
-        return Err(failure(format!(
-            "cannot be built: the sources are no longer at {}; give an image by --image FILE",
-            env!("CARGO_MANIFEST_DIR")
-        )));
+    let cargo = sources().map(|root| root.join("tests/board/cargo"));
+    cargo
+        .and_then(|cargo| compile(&cargo, PACKAGE, program))
+        .map_err(|why| {
+            failure(format!(
+                "cannot be built: {why}; or give an image by --image FILE"
+            ))
+        })
+}
+
+/// Where this program was compiled.
+///
+/// # Errors
+/// There is nothing any more.
+pub(super) fn sources() -> Result<PathBuf, String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    if root.join("Cargo.toml").exists() {
+        Ok(root)
+    } else {
+        Err(format!("the sources are no longer at {}", root.display()))
     }
-    let output = Command::new(&script)
-        .args(["build", "--release", "--quiet", "--package", PACKAGE])
+}
+
+/// Compiles a program of a package by `cargo`, or by a script that is like it. Returns its path.
+///
+/// # Errors
+/// It does not compile; what the compiler says has been shown.
+pub(super) fn compile(cargo: &Path, package: &str, program: &str) -> Result<PathBuf, String> {
+    let output = Command::new(cargo)
+        .args(["build", "--release", "--quiet", "--package", package])
         .args(["--bin", program])
         .arg("--message-format=json-render-diagnostics")
+        .current_dir(sources()?)
         .stderr(Stdio::inherit())
         .output()
-        .map_err(|error| failure(format!("cannot be built: {}: {error}", script.display())))?;
+        .map_err(|error| format!("{}: {error}", cargo.display()))?;
     if !output.status.success() {
-        return Err(failure(format!(
-            "cannot be built; see the output of {} above",
-            script.display()
-        )));
+        return Err(format!("see the output of {} above", cargo.display()));
     }
-    executable(&output.stdout)
-        .ok_or_else(|| failure(format!("cannot be built: cargo names no program {program}")))
+    executable(&output.stdout).ok_or_else(|| format!("cargo names no program {program}"))
 }
 
 /// The program among cargo's messages, one JSON object per line.

@@ -1,103 +1,55 @@
-//! The board's log: defmt sends message numbers; the texts are in the image.
+//! The board's log. It is read by a program of its own, `board-log`, which is compiled when the first board is emulated.
 
-use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
 
-use defmt_decoder::{DecodeError, Table};
+use super::image::{compile, sources};
+use crate::say;
 
-/// Every message as a line: time in s, level, text. An unreadable one becomes an error line.
+const READER: &str = "board-log";
+
+/// The log of this image as text, a message a line.
 ///
 /// # Errors
-/// The image has no messages, or those of another version of defmt.
-pub(super) fn decode(image: &[u8], log: &[u8]) -> Result<String, String> {
-    let table = Table::parse(image)
-        .map_err(|error| error.to_string())?
-        .ok_or("the image has no messages (no section .defmt)")?;
-    Ok(lines(&table, log))
+/// The reader cannot be compiled, or cannot read this.
+pub(super) fn read(image: &Path, log: Vec<u8>) -> Result<String, String> {
+    let reader = reader()?;
+    let failed = |error: std::io::Error| format!("{}: {error}", reader.display());
+    let mut child = Command::new(&reader)
+        .arg(image)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(failed)?;
+    let input = child.stdin.take();
+    // From a thread: whoever writes all before it reads waits for ever once both pipes are full.
+    let feed = thread::spawn(move || input.map_or(Ok(()), |mut input| input.write_all(&log)));
+    let output = child.wait_with_output().map_err(failed)?;
+    // A reader that ends early says why.
+    let _ = feed.join();
+    if output.status.success() {
+        String::from_utf8(output.stdout).map_err(|error| error.to_string())
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).trim().to_owned())
+    }
 }
 
-fn lines(table: &Table, log: &[u8]) -> String {
-    let mut decoder = table.new_stream_decoder();
-    decoder.received(log);
-    let mut text = String::new();
-    loop {
-        let line = match decoder.decode() {
-            Ok(message) => message.display(false).to_string(),
-            Err(DecodeError::Malformed) => "ERROR damaged, or a message of another image".into(),
-            Err(DecodeError::UnexpectedEof) => break,
-        };
-        let _ = writeln!(text, "{line}");
+/// The reader: the one beside this program, or else from the sources.
+fn reader() -> Result<PathBuf, String> {
+    let here = std::env::current_exe().map_err(|error| error.to_string())?;
+    let beside = here.with_file_name(READER);
+    if beside.is_file() {
+        return Ok(beside);
     }
-    // A message ends with a zero.
-    if log.last().is_some_and(|last| *last != 0) {
-        text.push_str("ERROR cut off in the middle of a message\n");
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-    use serde_json::json;
-
-    use super::*;
-
-    /// One message with a number, preceded by a time in milliseconds.
-    fn table() -> Table {
-        let entry = |tag, text| json!({"string": {"tag": tag, "string": text}, "raw_symbol": ""});
-        let table = json!({
-            "timestamp": entry("Timestamp", "{=u32:ms}"),
-            "entries": {
-                "1": entry("Info", "worst {=u8}"),
-                "2": entry("Warn", "{=str} {=[u8]} {=?} {=bool} {=f32} {=0..3}"),
-            },
-            "bitflags": {},
-            "encoding": "Rzcobs",
-        });
-        serde_json::from_value(table).unwrap()
-    }
-
-    /// Message 1 at 0x0102 ms with 9, by hand: the zeros are left out; the last byte before the end marks their places
-    /// (rzCOBS, bit n for byte n of seven).
-    const MESSAGE: [u8; 6] = [1, 2, 1, 9, 0b0011_0010, 0];
-
-    #[test]
-    fn a_message_is_a_line() {
-        let twice = [&[0], &MESSAGE[..], &MESSAGE[..]].concat();
-        assert_eq!(
-            lines(&table(), &twice),
-            "0.258 INFO worst 9\n0.258 INFO worst 9\n"
-        );
-        assert_eq!(lines(&table(), &[]), "");
-    }
-
-    #[test]
-    fn a_log_that_was_cut_or_is_of_another_image_says_so() {
-        let cut = [&MESSAGE[..], &MESSAGE[..3]].concat();
-        assert_eq!(
-            lines(&table(), &cut),
-            "0.258 INFO worst 9\nERROR cut off in the middle of a message\n"
-        );
-        let mut other = MESSAGE;
-        other[0] = 7;
-        assert_eq!(
-            lines(&table(), &[&other[..], &MESSAGE[..]].concat()),
-            "ERROR damaged, or a message of another image\n0.258 INFO worst 9\n"
-        );
-        assert!(decode(b"no image", &MESSAGE).is_err());
-    }
-
-    proptest! {
-        #[test]
-        fn no_garbage_is_a_panic(log in proptest::collection::vec(any::<u8>(), 0..200)) {
-            lines(&table(), &log);
-        }
-
-        /// A message with a valid number and nothing else valid.
-        #[test]
-        fn no_damage_is_a_panic(rest in proptest::collection::vec(any::<u8>(), 0..60)) {
-            if let Ok((message, _)) = table().decode(&[&[2, 0][..], &rest[..]].concat()) {
-                message.display(false).to_string();
-            }
-        }
-    }
+    let root = sources()?;
+    say!("plant-sim: compiling {READER}, which reads the board's log, once");
+    compile(Path::new("cargo"), READER, READER).map_err(|why| {
+        format!(
+            "{why}; `cargo build --release --package {READER}` in {} compiles its reader",
+            root.display()
+        )
+    })
 }

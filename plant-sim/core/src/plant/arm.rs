@@ -68,7 +68,7 @@ impl Body {
         Self {
             mass,
             com: self.com + between * share,
-            inertia: self.inertia + other.inertia + self.mass * share * between.norm_squared(),
+            inertia: self.inertia + other.inertia + self.mass * share * between.dot(&between),
         }
     }
 
@@ -225,7 +225,7 @@ impl Arm {
         let moves = |body: usize, vector| turned(vector) * speed[body];
         let elbow = moves(0, at.elbow);
         let energy = |body: &Body, turns: f64, velocity: Vector2<f64>| {
-            0.5 * (body.mass * velocity.norm_squared() + body.inertia * square(turns))
+            0.5 * (body.mass * velocity.dot(&velocity) + body.inertia * square(turns))
         };
         energy(&self.upper_arm, speed[0], moves(0, self.upper_arm.com))
             + energy(&self.forearm, speed[1], elbow + moves(1, at.forearm))

@@ -252,7 +252,8 @@ impl Defects {
     /// Energy in the spring, J.
     pub(super) fn elastic(&self, arm: &Arm, at: &Configuration) -> f64 {
         let energy = |spring: &Spring| {
-            0.5 * spring.stiffness * (arm.flange(at).0 - spring.at).norm_squared()
+            let by = arm.flange(at).0 - spring.at;
+            0.5 * spring.stiffness * by.dot(&by)
         };
         self.springs.iter().map(energy).sum()
     }
