@@ -172,6 +172,11 @@ class Bench:
         self.add("plant-sim --help, wall", median(lambda: Process(self.given.plant_sim, "--help").wall) * 1000, "ms")
         self.add("gate, one cycle, from start to its summary, wall", median(lambda: self.run()[0].wall) * 1000, "ms")
 
+    def first_run(self):
+        """What `cargo run --release` compiles in a new clone."""
+        process = Process("cargo", "build", "--release", "--locked", "--quiet", "--target-dir", self.given.work / "first")
+        self.add("cargo build --release of a new clone, wall", process.wall, "s", f"{process.cpu:.0f} s of the processor")
+
     def growth(self):
         """Cost against cycles: linear in time, none in memory."""
         before = None
@@ -208,7 +213,7 @@ def main():
     Process.peak = arguments.work / "peak"
     bench = Bench(arguments)
     for part in (bench.plant, bench.lock_step, bench.cases, bench.emulated, bench.cost, bench.web, bench.traces, bench.start,
-                 bench.growth):
+                 bench.first_run, bench.growth):
         part()
     if arguments.json:
         print(json.dumps({"machine": machine(), "rows": bench.rows}, indent=2))
