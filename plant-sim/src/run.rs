@@ -126,9 +126,16 @@ pub fn execute_with<C: Peer, P: Pace, O: Observer>(
     pace: &mut P,
     observer: O,
 ) -> Result<Results, ExecuteError> {
-    record(config, recording, observer, |observers| {
-        with_controller(config, connect, &mut Heeding(pace), observers)
-    })
+    let begin = || Ok(connect(config.rig()?.controller())?);
+    record(
+        config,
+        recording,
+        observer,
+        begin,
+        |controller, observers| {
+            with_controller(config, |_| Ok(controller), &mut Heeding(pace), observers)
+        },
+    )
 }
 
 /// What records a run: trace, truth, progress, and one more observer.
@@ -137,20 +144,27 @@ pub type Recorders<O> = (
     (Option<TruthLog<File>>, (Option<Progress>, O)),
 );
 
-/// Records the run that `run` performs, as [`execute`] does.
+/// Records the run that `run` performs with what `begin` has made ready, as [`execute`] does.
 ///
 /// # Errors
 /// Nothing was run, or nothing could be written; see [`ExecuteError`].
-pub fn record<O: Observer>(
+pub fn record<B, O: Observer>(
     config: &RunConfig,
     recording: &Recording<'_>,
     observer: O,
-    run: impl FnOnce(&mut Recorders<O>) -> Result<Summary, Failure>,
+    begin: impl FnOnce() -> Result<B, Failure>,
+    run: impl FnOnce(B, &mut Recorders<O>) -> Result<Summary, Failure>,
 ) -> Result<Results, ExecuteError> {
     let folder = recording.folder;
     let failed = |source| folder.failed(source);
+    let failed_run = |failure| match failure {
+        Failure::Setup(error) => ExecuteError::from(error),
+        Failure::Controller(error) => error.into(),
+        Failure::Output(source) => failed(source).into(),
+    };
     // What cannot begin leaves older results alone.
-    config.rig()?;
+    let began = Instant::now();
+    let begun = begin().map_err(failed_run)?;
     folder.clear()?;
     let kept = |name| recording.traces.then(|| folder.create(name)).transpose();
     let trace = kept("trace.log")?.map(TraceLog::new);
@@ -163,12 +177,7 @@ pub fn record<O: Observer>(
         .then(|| Progress::new(config.scenario.cycles));
     let mut observers: Recorders<O> = (trace, (truth, (progress, observer)));
 
-    let began = Instant::now();
-    let summary = run(&mut observers).map_err(|failure| match failure {
-        Failure::Setup(error) => ExecuteError::from(error),
-        Failure::Controller(error) => error.into(),
-        Failure::Output(source) => failed(source).into(),
-    })?;
+    let summary = run(begun, &mut observers).map_err(failed_run)?;
     let wall_time_s = began.elapsed().as_secs_f64();
 
     let (trace, (truth, _)) = observers;

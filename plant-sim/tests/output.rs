@@ -122,6 +122,11 @@ fn older_results_do_not_lie_beside_new_ones_and_stay_where_nothing_was_run() {
     let refused = run(out).args(["--set", "cycles=0"]).output().unwrap();
     assert_eq!(refused.status.code(), Some(2));
     assert!(out.join("controller.log").exists());
+    // Nobody listens at this port, which needs a right of its own.
+    let nobody = ["--controller", "external", "--bus", "slcan:tcp:127.0.0.1:1"];
+    let alone = run(out).args(nobody).output().unwrap();
+    assert!(says(&alone).contains("out of reach") && !alone.status.success());
+    assert!(out.join("controller.log").exists());
 
     let quiet = run(out)
         .args(["--cycles", "1", "--no-trace", "--quiet"])

@@ -269,7 +269,8 @@ fn replay(args: &ReplayArgs) -> Result<(), Failure> {
     };
     let mut curves = Curves::new(&config);
     let mut verdict = None;
-    let results = run::record(&config, &recording, &mut curves, |observers| {
+    let begin = || Ok(config.rig().map(drop)?);
+    let results = run::record(&config, &recording, &mut curves, begin, |(), observers| {
         let mut all = (Collector::new(&config), observers);
         let connect = |config| Ok(InProcess::new(config));
         let (judged, rig, end) = trial::run(&config, connect, &mut all)?;

@@ -1,5 +1,7 @@
 //! Values that several subcommands take.
 
+use std::fs::File;
+use std::io::{ErrorKind, Read as _};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::thread;
@@ -52,10 +54,46 @@ pub(super) fn svg(text: &str) -> Result<PathBuf, String> {
 
 /// The image of a controller.
 pub(super) fn image(text: &str) -> Result<PathBuf, String> {
+    /// Of an ELF file of 32 bits, little-endian, and where its machine is named.
+    const BEGIN: &[u8] = b"\x7fELF\x01\x01";
+    const MACHINE: std::ops::Range<usize> = 18..20;
+    const ARM: [u8; 2] = [40, 0];
+    const ALLOWED: &str = "allowed: the ELF file of the board's program";
     let path = Path::new(text);
-    if path.is_file() {
-        Ok(path.into())
-    } else {
-        Err("there is no such file; allowed: the ELF file of the board's program".into())
+    if !path.is_file() {
+        return Err(format!("there is no such file; {ALLOWED}"));
+    }
+    let mut head = [0; 20];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut head));
+    match read {
+        Err(error) if error.kind() != ErrorKind::UnexpectedEof => Err(error.to_string()),
+        Ok(()) if head.starts_with(BEGIN) && head[MACHINE] == ARM => Ok(path.into()),
+        _ => Err(format!(
+            "that is no program for an Arm processor; {ALLOWED}"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::image;
+
+    #[test]
+    fn an_image_is_a_program_for_an_arm_processor() {
+        // A program of this machine, a text, nothing.
+        let own = std::env::current_exe().unwrap();
+        let text = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+        for other in [own.to_str().unwrap(), text, "/dev/null", "/nowhere"] {
+            assert!(image(other).unwrap_err().contains("allowed"), "{other}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("image");
+        // The first bytes of an image, by `readelf -h`.
+        let head = "7f454c4601010100000000000000000002002800";
+        let bytes: Vec<u8> = (0..20)
+            .map(|at| u8::from_str_radix(&head[2 * at..][..2], 16).unwrap())
+            .collect();
+        std::fs::write(&path, bytes).unwrap();
+        assert!(image(path.to_str().unwrap()).is_ok());
     }
 }
