@@ -180,14 +180,17 @@ fn name(state: State) -> &'static str {
     }
 }
 
-/// A controller after these events. Without observer, which would compensate for the torques that are missing in the
-/// readings here.
+/// A controller after these events, with a sample before torque comes on, and one with it. Without observer, which would
+/// compensate for the torques that are missing in the readings here.
 fn after(events: &[Event]) -> Controller {
     let mut config = Config::new(IRB_930, Period::of_rate(1000.0));
     config.setup.selection.compensation = Compensation::None;
     let mut controller = Controller::new(config);
     for event in events {
         assert!(controller.event(*event), "{event:?} of {events:?}");
+        if matches!(event, Event::PeerReady | Event::Enable) {
+            controller.step(&obedient(&controller), &mut ());
+        }
     }
     controller
 }

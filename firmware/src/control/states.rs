@@ -1,6 +1,7 @@
 //! States of the drive cabinet and every transition between them.
 //!
-//! [`TRANSITIONS`] is the whole machine; the test `states` makes the drawing in `docs/safety.md` from it. A state
+//! [`TRANSITIONS`] is the whole machine; the test `states` makes the drawing in `docs/safety.md` from it. Only what leaves
+//! [`State::Enabling`] before the first command with torque leads to the state without torque at once. A state
 //! carries what it needs and determines the control word for the drives ([`State::control_word`]). Entry actions are in
 //! [`controller`](super::controller).
 
@@ -204,6 +205,17 @@ impl State {
             Self::Disabling(_) => Self::Disabling(samples),
             Self::Fault(Halt::Closing(_)) => Self::Fault(Halt::Closing(samples)),
             Self::EStop(Halt::Closing(_)) => Self::EStop(Halt::Closing(samples)),
+            other => other,
+        }
+    }
+
+    /// This state, if it is entered before torque has come on: nothing has to be held then until the brake has closed, and a
+    /// stop must not begin by switching on what it is to switch off.
+    pub(super) const fn without_torque(self) -> Self {
+        match self {
+            Self::Fault(Halt::Closing(_)) => Self::Fault(Halt::Off),
+            Self::EStop(Halt::Closing(_)) => Self::EStop(Halt::Off),
+            Self::Disabling(_) => Self::Ready,
             other => other,
         }
     }

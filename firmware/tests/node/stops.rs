@@ -2,8 +2,9 @@
 
 use firmware::control::controller::Config;
 use firmware::mechanics::arm::IRB_930;
+use protocol::codec::encode;
 use protocol::messages::{
-    Cause, ControlWord, DriveStatus, FaultAxis, Message, Mode, MotionRequest, Outcome,
+    Cause, Command, ControlWord, DriveStatus, FaultAxis, Message, Mode, MotionRequest, Outcome,
 };
 
 use crate::bench::{Bench, PERIOD, by_itself, estop, is_off};
@@ -267,4 +268,55 @@ fn a_law_without_a_finite_torque_takes_brake_and_torque_off() {
         assert!(is_off(&bench.command()));
     }
     assert_eq!(bench.node.controller().cause(), Cause::BadValue);
+}
+
+/// Between the request to switch on and the first command with torque nothing is on: what would end torque keeps it from coming on.
+#[test]
+fn torque_that_has_not_come_on_does_not_come_on_for_a_stop() {
+    type Harm = fn(&mut Bench);
+    let harms: [(Mode, Cause, Harm); 5] = [
+        (Mode::Ready, Cause::None, |bench| {
+            let frame = bench.motion(MotionRequest::Disable);
+            bench.wire.to_node.push_back(frame);
+        }),
+        (Mode::EStop, Cause::EStop, |bench| {
+            bench.wire.to_node.push_back(estop());
+        }),
+        (Mode::Fault, Cause::DuplicateNode, |bench| {
+            let command = Command {
+                sample: 0,
+                control: OFF,
+                torque: [0.0; 4],
+            };
+            let frame = encode(&Message::Command(command), 0).unwrap();
+            bench.wire.to_node.push_back(frame);
+        }),
+        (Mode::Fault, Cause::DriveFault, |bench| {
+            bench.status = bench.status | DriveStatus::FAULT;
+        }),
+        (Mode::Fault, Cause::EncoderFault, |bench| {
+            bench.status = DriveStatus::READY;
+        }),
+    ];
+    for (mode, cause, harm) in harms {
+        let mut bench = Bench::asked_to_enable().0;
+        harm(&mut bench);
+        for _ in 0..200 {
+            assert!(is_off(&bench.command()), "{cause}");
+            let found = (bench.mode(), bench.node.controller().cause());
+            assert_eq!(found, (mode, cause));
+        }
+        if mode != Mode::Ready {
+            continue;
+        }
+        // The torque of the time before does not count.
+        bench.request(MotionRequest::Enable);
+        bench.run(100);
+        bench.request(MotionRequest::Disable);
+        let enable = bench.motion(MotionRequest::Enable);
+        bench.wire.to_node.push_back(enable);
+        harm(&mut bench);
+        assert!(is_off(&bench.command()));
+        assert_eq!(bench.mode(), mode);
+    }
 }

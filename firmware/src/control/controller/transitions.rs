@@ -17,9 +17,12 @@ const SLOW_LIFT: f32 = 0.2;
 impl Controller {
     /// Takes the transition of the current state on `event`; returns whether there is one.
     pub fn event(&mut self, event: Event) -> bool {
-        let Some(next) = self.state.after(event, self.brake_samples()) else {
+        let Some(mut next) = self.state.after(event, self.brake_samples()) else {
             return false;
         };
+        if matches!(self.state, State::Enabling(_)) && self.built_up == 0.0 {
+            next = next.without_torque();
+        }
         if event == Event::SelfTestPassed {
             self.body = Body::new(&self.arm, &self.setup.payload);
         }
