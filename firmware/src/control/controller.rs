@@ -231,6 +231,7 @@ impl Controller {
             self.setpoint = Setpoint::rest(q);
             self.is_placed = true;
             self.queue.clear(&q);
+            self.last_qd = qd;
             self.error = Vector4::zeros();
             self.excess = Vector4::zeros();
             self.saturated = 0;

@@ -148,12 +148,13 @@ impl Monitor {
         Some(Fault::value(cause, f32::from(status.bits()), 0.0))
     }
 
-    /// Judges one sample; `error` is reference minus measured position, and `before` that of the last sample.
+    /// Judges one sample; `error` is reference minus measured position, and `before` that of the last sample, in which the velocity was
+    /// `last_qd`.
     pub fn check(
         &mut self,
         readings: &Readings,
         q: &Vector4<f32>,
-        qd: &Vector4<f32>,
+        [qd, last_qd]: [&Vector4<f32>; 2],
         [error, before]: [&Vector4<f32>; 2],
     ) -> Option<Fault> {
         if is_within(error, &self.following_error)
@@ -163,7 +164,7 @@ impl Monitor {
             (self.following_count, self.speed_count, self.range_count) = (0, 0, 0);
             return None;
         }
-        self.trip(readings, [q, qd, error, before])
+        self.trip(readings, [q, qd, last_qd, error, before])
     }
 
     /// Judges the axes of the shaft alone, by the same error, where the others are without torque.
@@ -186,12 +187,20 @@ impl Monitor {
     fn trip(
         &mut self,
         readings: &Readings,
-        [q, qd, error, before]: [&Vector4<f32>; 4],
+        [q, qd, last_qd, error, before]: [&Vector4<f32>; 5],
     ) -> Option<Fault> {
         let speed = first_beyond(qd, &self.speed);
         let range = first_beyond(&(q - self.middle), &self.reach);
         // A jump shows as a speed beyond its limit, if not as a following error.
-        if let Some(fault) = self.jumped(&(error - before), readings.steps) {
+        // Nor does an axis leave its way by full speed in one sample, unless it has got faster and faster until then, or after a gap.
+        let leap = first_beyond(&(qd - last_qd), &(self.speed * 0.5));
+        let is_sudden = readings.steps == 1 && leap.is_some();
+        let samples = if is_sudden {
+            0.5
+        } else {
+            readings.steps as f32
+        };
+        if let Some(fault) = self.jumped(&(error - before), samples) {
             return Some(fault);
         }
         if self.following_count == 0 {
@@ -315,8 +324,8 @@ impl Monitor {
     }
 
     /// An encoder that jumps further in these samples than its axis can move.
-    pub fn jumped(&self, moved: &Vector4<f32>, steps: u32) -> Option<Fault> {
-        let jump = self.jump * steps as f32;
+    pub fn jumped(&self, moved: &Vector4<f32>, samples: f32) -> Option<Fault> {
+        let jump = self.jump * samples;
         let axis = most_beyond(moved, &jump)?;
         Some(of_axis(Cause::EncoderFault, axis, moved, &jump))
     }

@@ -140,6 +140,28 @@ fn a_jump_is_told_of_its_own_axis() {
     }
 }
 
+/// By 1.25 times full speed in a sample, less than what turning back at full speed is. Nothing else is told, and no stop closes the loop.
+#[test]
+fn a_jump_that_no_axis_can_make_is_told_at_once_at_a_low_rate() {
+    for (rate, axis, jump, at) in [
+        (100.0, "lift", -0.0275, 0.45),
+        (125.0, "lift", -0.0205, 0.54),
+        (100.0, "shoulder", 0.096, 0.3),
+        (100.0, "wrist", -0.371, 0.6),
+        (250.0, "elbow", 0.1025, 0.33),
+    ] {
+        let mut scenario = Scenario::built_in("gate").expect("it is built in");
+        (scenario.cycles, scenario.rate_hz) = (1, rate);
+        let text = format!("encoder:{axis}:jump={jump}@{at}s");
+        let (summary, _) = run_of(scenario, &[&text], 0);
+        let first = &summary.faults[0];
+        let found = (first.cause, first.axis);
+        assert_eq!(found, ("encoder-fault", Some(axis)), "{text}");
+        // The sample of the jump, and what the frames of two take.
+        assert!(first.time_s < at + 1.5 / rate, "{text}: {first:?}");
+    }
+}
+
 /// Nobody acknowledges a feedback, so that it is repeated without end: old ones keep no clock from going on, and the controller says that it has
 /// switched off.
 #[test]

@@ -131,7 +131,7 @@ impl Controller {
         // The reference of the last sample: at most one sample of motion older than `q`.
         let moved = self.setpoint.reference.qd * self.period;
         let errors = [&(error + moved), &self.error];
-        if let Some(fault) = self.monitor.check(readings, q, qd, errors)
+        if let Some(fault) = self.monitor.check(readings, q, [qd, &self.last_qd], errors)
             && !(fault.cause == Cause::SoftLimit && self.is_freed(q))
         {
             self.fail(fault);
@@ -215,7 +215,7 @@ impl Controller {
         if self.state == State::Ready {
             // Since the last sample, which may have been the last one under torque.
             let moved = self.setpoint.reference.q - self.error - q;
-            let jump = self.monitor.jumped(&moved, readings.steps);
+            let jump = self.monitor.jumped(&moved, readings.steps as f32);
             let jump = jump.filter(|_| self.is_placed);
             if let Some(fault) = Monitor::status(status, false).or(jump) {
                 self.fail(fault);
