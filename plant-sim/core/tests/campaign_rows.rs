@@ -119,7 +119,7 @@ lasts_ms = [0]
 [[situation]]
 name = "at the end of the lift, 2 kg"
 scenario = "gate"
-set = ["cycles=1", "cycle=[{ joints = { to = [0.3, 1.0, 0.3, 0.0] } }, { dwell = 0.5 }]"]
+set = ["rate_hz=500", "cycles=1", "cycle=[{ joints = { to = [0.3, 1.0, 0.3, 0.0] } }, { dwell = 0.5 }]"]
 begin_ms = { from = 800, until = 900, step = 0.7 }
 
 [[situation]]
