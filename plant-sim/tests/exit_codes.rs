@@ -195,6 +195,9 @@ fn a_run_or_check_that_failed_is_1() {
     }
 }
 
+/// 2^63: no seed of a scenario file is so great.
+const TOO_GREAT: &str = "9223372036854775808";
+
 #[test]
 fn wrong_usage_or_input_is_2() {
     for wrong in [
@@ -211,6 +214,8 @@ fn wrong_usage_or_input_is_2() {
         &["run", "--image", "image.elf"],
         &["run", "--image", "empty.log"],
         &["run", "--seed", "-1"],
+        &["campaign", "plan", "--count", "1", "--seed", TOO_GREAT],
+        &["run", "--seed", TOO_GREAT],
         &["run", "--payload", "2kg"],
         &["eval", "dynamics", "--elbow", "positive"],
         &["eval", "ik", "--turn", "9"],

@@ -122,7 +122,7 @@ fn a_case_is_the_same_with_the_prelude_of_others() {
         let connect = |config| Ok(InProcess::new(config));
         let (expected, ..) = trial::run(case, connect, &mut whole).unwrap();
         assert!(prelude.leads_to(&case.scenario));
-        let verdict = prelude.judge(case, &mut end).unwrap();
+        let verdict = prelude.judge_watched(case, &mut end).unwrap();
         assert_eq!(verdict, expected, "{faults:?}");
         assert!(whole.frames.ends_with(&end.frames), "{faults:?}");
         assert!(whole.truths.ends_with(&end.truths), "{faults:?}");
@@ -148,14 +148,14 @@ fn a_prelude_stops_a_sample_before_the_fault() {
     };
     let mut prelude = Prelude::new(&case(0)).unwrap();
     let later = case(500_000);
-    prelude.judge(&later, &mut ()).unwrap();
+    prelude.judge(&later).unwrap();
     for us in [
         500_700, 500_130, 500_000, 499_999, 499_130, 499_000, 498_000,
     ] {
         let fits = prelude.leads_to(&case(us).scenario);
         assert_eq!(fits, us >= 500_000, "{us}");
         if fits {
-            let verdict = prelude.judge(&case(us), &mut ()).unwrap();
+            let verdict = prelude.judge(&case(us)).unwrap();
             let connect = |config| Ok(InProcess::new(config));
             let (expected, ..) = trial::run(&case(us), connect, &mut ()).unwrap();
             assert_eq!(verdict, expected, "{us}");

@@ -113,5 +113,5 @@ pub fn judge(
         Some(begun) if begun.leads_to(&config.scenario) => begun,
         other => other.insert(Prelude::new(&config).map_err(failed)?),
     };
-    prelude.judge(&config, &mut ()).map_err(failed)
+    prelude.judge(&config).map_err(failed)
 }

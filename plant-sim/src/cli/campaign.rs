@@ -52,7 +52,10 @@ pub(super) struct PlanArgs {
     #[arg(long, value_name = "N", value_parser = count)]
     count: Option<NonZero<u32>>,
     /// Seed of the draw.
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "count")]
+    #[arg(
+        long, value_name = "N", default_value_t = 0, requires = "count",
+        value_parser = clap::value_parser!(u64).range(..=i64::MAX.unsigned_abs())
+    )]
     seed: u64,
 }
 

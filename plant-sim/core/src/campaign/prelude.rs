@@ -70,12 +70,20 @@ impl Prelude {
         self.rig.now() + Period::of_rate(self.scenario.rate_hz).duration() * samples
     }
 
+    /// Like [`Prelude::judge_watched`], with nobody who watches: compiled here, where code is optimised, and not by its user.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn judge(&mut self, case: &RunConfig) -> Result<Verdict, Failure> {
+        self.judge_watched(case, &mut ())
+    }
+
     /// Goes on up to the first fault of a case that it leads to, or to the end of the scenario, and judges the case from there. The
     /// same comes of it as of a run of its own, whose end is all that `observer` sees.
     ///
     /// # Errors
     /// See [`Failure`].
-    pub fn judge<O: Observer>(
+    pub fn judge_watched<O: Observer>(
         &mut self,
         case: &RunConfig,
         observer: &mut O,
