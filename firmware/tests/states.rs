@@ -4,7 +4,6 @@
     clippy::expect_used,
     clippy::indexing_slicing,
     clippy::panic,
-    clippy::unwrap_used,
     reason = "a test fails by panicking"
 )]
 
@@ -180,8 +179,7 @@ fn name(state: State) -> &'static str {
     }
 }
 
-/// A controller after these events, with a sample before torque comes on, and one with it. Without observer, which would
-/// compensate for the torques that are missing in the readings here.
+/// A controller after these events, with a sample before torque and one with it; without observer: readings here have no torques.
 fn after(events: &[Event]) -> Controller {
     let mut config = Config::new(IRB_930, Period::of_rate(1000.0));
     config.setup.selection.compensation = Compensation::None;
@@ -197,8 +195,7 @@ fn after(events: &[Event]) -> Controller {
 
 /// Readings of an arm at rest, whose brake is where it was told to be.
 fn obedient(controller: &Controller) -> Readings {
-    let word = controller.control_word();
-    let is_open = word.contains(ControlWord::BRAKE_RELEASE);
+    let is_open = (controller.control_word()).contains(ControlWord::BRAKE_RELEASE);
     let mut readings = at_rest();
     readings.status = readings.status.with(DriveStatus::BRAKE_RELEASED, is_open);
     readings

@@ -154,8 +154,8 @@ impl Monitor {
         &mut self,
         readings: &Readings,
         q: &Vector4<f32>,
-        [qd, last_qd]: [&Vector4<f32>; 2],
-        [error, before]: [&Vector4<f32>; 2],
+        qd: &Vector4<f32>,
+        [error, before, last_qd]: [&Vector4<f32>; 3],
     ) -> Option<Fault> {
         if is_within(error, &self.following_error)
             && is_within(qd, &self.speed)
@@ -195,13 +195,10 @@ impl Monitor {
         // Nor does an axis leave its way by full speed in one sample, unless it has got faster and faster until then, or after a gap.
         let leap = first_beyond(&(qd - last_qd), &(self.speed * 0.5));
         let is_sudden = readings.steps == 1 && leap.is_some();
-        let samples = if is_sudden {
-            0.5
-        } else {
-            readings.steps as f32
-        };
-        if let Some(fault) = self.jumped(&(error - before), samples) {
-            return Some(fault);
+        let share = if is_sudden { 0.5 } else { 1.0 };
+        let jump = self.jumped(&(error - before), readings.steps as f32 * share);
+        if jump.is_some() {
+            return jump;
         }
         if self.following_count == 0 {
             self.velocity = readings.velocity;
