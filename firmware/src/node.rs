@@ -283,7 +283,7 @@ impl Node {
         if self.controller.mode() == Mode::PreOperational
             && self.same_schema == Some(true)
             && feedback.status.contains(DriveStatus::ENCODER_VALID)
-            && !feedback.status.contains(DriveStatus::BRAKE_RELEASED)
+            && self.controller.may_be_ready(feedback.status)
         {
             self.controller.event(Event::PeerReady);
         }

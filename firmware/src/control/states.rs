@@ -82,7 +82,7 @@ listed! {
 
 /// Every transition: from, on, to. An event without a row here changes nothing. The samples left of a state are 0 here;
 /// the controller sets them to the time of the brake on entering it.
-pub const TRANSITIONS: [(State, Event, State); 53] = {
+pub const TRANSITIONS: [(State, Event, State); 52] = {
     use Event::{
         Arrived, AtRest, BrakeClosed, BrakeOpen, Disable, EmergencyStop, Enable, FaultBrake,
         FaultOff, FaultStop, PeerReady, Reset, SelfTestPassed, Start, Stop,
@@ -96,8 +96,6 @@ pub const TRANSITIONS: [(State, Event, State); 53] = {
         // Nothing else leaves the self-test: an emergency stop with its reset would lead past it.
         (SelfTest, SelfTestPassed, PreOperational),
         (PreOperational, PeerReady, Ready),
-        // A brake that does not hold is told by a controller that nobody has greeted, too: one that has restarted.
-        (PreOperational, FaultBrake, Fault(Off)),
         (PreOperational, EmergencyStop, EStop(Off)),
         (Ready, Enable, Enabling(0)),
         // What breaks without torque is as broken as with it. Nothing is to stop.

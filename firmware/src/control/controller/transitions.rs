@@ -82,7 +82,7 @@ impl Controller {
                     self.queue.clear(&self.setpoint.reference.q);
                 }
             }
-            State::PreOperational => (self.fault, self.misplaced) = (Fault::NONE, 0),
+            State::PreOperational => self.fault = Fault::NONE,
             _ => {}
         }
         self.state = next;
@@ -235,6 +235,11 @@ impl Controller {
         if self.is_unheld() && (was_closed || !was_told) {
             self.fail(open_brake(status));
         }
+    }
+
+    /// Whether the brake, by this status, is where it has to be for an arm that is ready, or has had its time and the arm gets ready to tell it.
+    pub fn may_be_ready(&self, status: DriveStatus) -> bool {
+        !status.contains(DriveStatus::BRAKE_RELEASED) || self.is_unheld()
     }
 
     /// Whether an arm without torque has been without its brake for longer than that takes to close.
