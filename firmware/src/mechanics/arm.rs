@@ -31,12 +31,8 @@ impl Axis {
     /// The component of a joint vector that belongs to this axis.
     #[must_use]
     pub fn of(self, joint: &Vector4<f32>) -> f32 {
-        match self {
-            Self::Shoulder => joint.x,
-            Self::Elbow => joint.y,
-            Self::Lift => joint.z,
-            Self::Wrist => joint.w,
-        }
+        // Its place in the order, which a vector of four always has.
+        joint.as_slice().get(self as usize).copied().unwrap_or(0.0)
     }
 
     /// The same, to change it.
