@@ -1,7 +1,7 @@
 //! One sample of control: states, motion, control laws, limits and faults.
 //!
 //! [`controller`] joins the parts; each of the others is pure: [`readings`] what the drives report, [`states`] the
-//! states, [`laws`] the control laws, [`limits`] what a motor can give, [`monitor`], [`chatter`] and [`heat`] what counts as a fault,
+//! states, [`laws`] the control laws, [`limits`] what a motor can give, [`monitor`], [`chatter`], [`stance`] and [`heat`] what counts as a fault,
 //! [`fault`] the reaction to it, [`setup`] what can be changed at run time. [`phase`] is the probe that measures what each part costs.
 //! Depends on [`mechanics`](crate::mechanics) and [`trajectory`](crate::trajectory).
 
@@ -34,4 +34,5 @@ pub mod phase;
 pub mod readings;
 pub mod self_test;
 pub mod setup;
+pub mod stance;
 pub mod states;

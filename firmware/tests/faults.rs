@@ -95,7 +95,7 @@ fn seen_by(cause: Cause) -> &'static str {
         Cause::BadValue => "value in the feedback; once in a torque of the law",
         Cause::FollowingError => "reference against encoder",
         Cause::StuckSensor => {
-            "reference, or torque at its limit, against an encoder that does not move"
+            "reference, effort, or torque at its limit, against an encoder that does not move"
         }
         Cause::OverSpeed => "speed of the encoder; in manual operation of the tool",
         Cause::OverTorque => "a torque cut to its limit while the axis hardly moves",

@@ -35,6 +35,7 @@ use crate::control::monitor::{Felt, Monitor};
 use crate::control::phase::{Phase, Probe};
 use crate::control::readings::Readings;
 use crate::control::setup::Setup;
+use crate::control::stance::Stance;
 use crate::control::states::State;
 use crate::mechanics::arm::ArmModel;
 use crate::mechanics::body::Body;
@@ -142,6 +143,7 @@ pub struct Controller {
     arm: ArmModel,
     replies: Deque<MotionReply, { 2 * CAPACITY }>,
     unanswered: u16,
+    stance: Stance,
     queue: MoveQueue,
 }
 
@@ -189,6 +191,7 @@ impl Controller {
             heat: Heat::new(),
             burden: Burden::new(),
             chatter: Chatter::new(),
+            stance: Stance::new(),
             excess: Vector4::zeros(),
             error: Vector4::zeros(),
             last_qd: Vector4::zeros(),

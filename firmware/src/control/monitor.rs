@@ -276,14 +276,18 @@ impl Monitor {
             let (before, now, found) = (axis.of(&before), axis.of(now), axis.of(qd));
             was_to_move(axis) && now * before > 0.0 && found * before < -BACK * before * before
         };
+        let went_back = Axis::ALL.map(is_back);
+        let mut suspects = went_back;
+        if let Some(felt) = suspects.get_mut(axis as usize) {
+            *felt = true;
+        }
         let stands = Axis::ALL.map(|it| is_still(it) && (it == axis || was_to_move(it)));
         // Away from its reference, and not ahead of it on the same way.
         let is_away = (axis.of(qd) - axis.of(now)).abs() > 0.5 * axis.of(qd).abs();
         Felt::Fault(if let Some(axis) = self.farthest(stands, error) {
             of_axis(Cause::StuckSensor, axis, error, &Vector4::zeros())
-        } else if Axis::ALL.into_iter().any(is_back)
-            && let went_back = Axis::ALL.map(|it| it == axis || is_back(it))
-            && let Some(axis) = self.farthest(went_back, error)
+        } else if went_back != [false; 4]
+            && let Some(axis) = self.farthest(suspects, error)
         {
             of_axis(Cause::EncoderFault, axis, error, &Vector4::zeros())
         } else if is_away && readings.runs_away(axis, axis.of(&self.velocity_felt)) {
@@ -343,9 +347,10 @@ fn is_within(value: &Vector4<f32>, limit: &Vector4<f32>) -> bool {
     !value.iter().zip(limit.iter()).any(beyond)
 }
 
+/// The first axis whose value is beyond its limit, by magnitude.
 // Out of line: rarely reached in a sample.
 #[inline(never)]
-fn first_beyond(value: &Vector4<f32>, limit: &Vector4<f32>) -> Option<Axis> {
+pub(super) fn first_beyond(value: &Vector4<f32>, limit: &Vector4<f32>) -> Option<Axis> {
     let beyond = |axis: &Axis| axis.of(value).abs().to_bits() > axis.of(limit).to_bits();
     Axis::ALL.into_iter().find(beyond)
 }

@@ -58,6 +58,8 @@ pub(crate) struct Bench {
     pub status: DriveStatus,
     /// Whether the drives do what the control word says.
     pub obeys: bool,
+    /// Whether the encoders are between two counts, and show now this one and now that: no reading stands for ever.
+    pub flickers: bool,
     /// Whether the brake opens when it is told to; at once.
     pub opens: bool,
     pub follows: bool,
@@ -85,6 +87,7 @@ impl Bench {
             torque: [0; 4],
             status: DriveStatus::READY | DriveStatus::ENCODER_VALID,
             obeys: true,
+            flickers: true,
             opens: true,
             follows: false,
             off: Vector4::zeros(),
@@ -189,10 +192,11 @@ impl Bench {
         } else {
             self.status
         };
+        let other = i32::from(self.flickers && self.sample / 10 % 2 == 1);
         let feedback = Feedback {
             sample: self.sample,
             status: status.with(DriveStatus::TORQUE_ON, is_on),
-            position: self.position,
+            position: self.position.map(|count| count + other),
             velocity: self.velocity,
             torque: self.torque,
         };

@@ -204,8 +204,9 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.run(2)
         }
         Cause::StuckSensor => {
-            // As for the torque, and the encoder stands.
+            // As for the torque, of which the motor has all that it may have for ever, and the encoder stands.
             bench.position[2] += (0.009 / 0.025 * 131_072.0) as i32;
+            bench.torque[2] = -1000;
             bench.run(3)
         }
         Cause::OverSpeed => {
@@ -302,7 +303,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::EncoderFault => format!("encoder fault: {up}"),
             Cause::Collision => "collision, axis 3 (lift): 1874.9 N, limit 430.0 N".into(),
             Cause::Chatter => "chatter, axis 2 (elbow): 81 %, limit 80 %".into(),
-            Cause::Overload => "overload, axis 3 (lift): 120.1 %, limit 120.0 %".into(),
+            Cause::Overload => "overload, axis 3 (lift): 120.01 %, limit 120.00 %".into(),
             _ => String::new(),
         };
         assert_eq!(state.fault().to_string(), expected);
@@ -344,6 +345,7 @@ fn an_encoder_that_stands_while_its_motor_gives_everything_is_stuck() {
             bench.enable();
             bench.run(100);
             bench.position[2] += (0.009 / 0.025 * 131_072.0) as i32;
+            bench.torque[2] = -1000;
             bench.velocity[2] = velocity;
             bench.run(samples - 1);
             assert_eq!(bench.mode(), Mode::Enabled, "{rate} Hz");

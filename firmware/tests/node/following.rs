@@ -54,7 +54,7 @@ fn samples_that_nobody_has_counted_are_caught_up() {
     }
     let qd = bench.node.controller().reference().qd;
     assert!(qd.x < -2.0, "{qd}");
-    bench.follows = false;
+    (bench.follows, bench.flickers) = (false, false);
     let drive = Drive::new(&IRB_930.drive);
     let mut place = here(&bench);
     for (times, behind) in [(1.0, 0.0), (2.0, 1.0), (1.0, 0.0), (1.0, 0.0)] {

@@ -1,7 +1,7 @@
 //! What follows where an axis would need more torque than there is, for an instant or for ever, or where its torque swings.
 
 use nalgebra::Vector4;
-use protocol::messages::{Cause, Fault, LimitFlags};
+use protocol::messages::{Cause, Fault, LimitFlags, Operation};
 
 use super::Controller;
 use crate::control::fault::{CHATTER_PERCENT, OVERLOAD_PERCENT};
@@ -19,6 +19,8 @@ const STUCK_SAMPLES: u32 = 2;
 /// is meant to: it has [`PATIENCE`] times as long.
 const STUCK_ERROR: f32 = 0.05;
 const PATIENCE: u32 = 8;
+/// Share of its greatest torque that the motor of such an axis has at least, by its drive. It builds up in a few samples.
+const PULLS: f32 = 0.25;
 /// How much faster a motor gets whose axis turns back however much the others work against it, rad/s². Its encoder moves.
 const TURNING: f32 = 100.0;
 /// Share of its greatest speed below which an axis hardly moves. It passes that within milliseconds when it turns back.
@@ -55,28 +57,26 @@ impl Controller {
         let period = self.period;
         let excess = self.excess;
         let slow = self.arm.limits.velocity * SLOW;
-        let at_limit = |axis: &Axis| axis.of(&excess) != 0.0;
         let off = self.setup.monitor.following_error * STUCK_ERROR;
+        let stills = Axis::ALL.map(|axis| self.strains(axis, readings).then_some(axis));
         let is_off = |axis: &Axis| axis.of(&self.error).abs() > axis.of(&off);
-        let is_still = |axis: &Axis| at_limit(axis) && readings.is_still(*axis);
-        let is_stuck = |axis: &Axis| is_still(axis) && is_off(axis);
-        let stands = |axis: &Axis| at_limit(axis) && axis.of(qd).abs() < axis.of(&slow);
+        let stuck = stills.into_iter().flatten().find(is_off);
+        let stands = |axis: &Axis| axis.of(&excess) != 0.0 && axis.of(qd).abs() < axis.of(&slow);
 
-        let stuck = Axis::ALL.into_iter().find(is_stuck);
         let before = self.strained;
         self.strained = readings.velocity;
         let turns = |axis: Axis| {
             let gained = axis.of(&(readings.velocity - before)) * axis.of(&excess).signum();
             readings.stays_still(axis, axis.of(&before)) && gained > TURNING * period
         };
-        match stuck.or(Axis::ALL.into_iter().find(is_still)) {
+        match stuck.or(stills.into_iter().flatten().next()) {
             Some(axis) if self.stuck > 0 && turns(axis) => {}
             Some(axis) if !self.state.is_braking() => {
                 self.stuck += if stuck.is_some() { PATIENCE } else { 1 };
                 let is_long = self.stuck as f32 * period > STUCK_TIME * PATIENCE as f32;
                 if is_long && self.stuck >= STUCK_SAMPLES * PATIENCE {
                     let (error, limit) = (axis.of(&self.error), axis.of(&off));
-                    self.blame(axis, Fault::value(Cause::StuckSensor, error, limit));
+                    self.blame(axis, Cause::StuckSensor, error, limit);
                 }
             }
             _ => self.stuck = 0,
@@ -84,17 +84,27 @@ impl Controller {
         let rise = self.arm.limits.effort_rise_time / period;
         if let Some(axis) = self.chatter.cut(&excess, &rise) {
             let limit = f32::from(CHATTER_PERCENT);
-            self.blame(axis, Fault::value(Cause::Chatter, FULL_SWING, limit));
+            self.blame(axis, Cause::Chatter, FULL_SWING, limit);
         }
         if let Some(axis) = Axis::ALL.into_iter().find(stands) {
             self.saturated += 1;
             let time = self.saturated as f32 * period;
             let limit = self.setup.saturation_time;
             if time >= limit {
-                let fault = Fault::value(Cause::OverTorque, time * 1e3, limit * 1e3);
-                self.blame(axis, fault);
+                self.blame(axis, Cause::OverTorque, time * 1e3, limit * 1e3);
             }
         }
+    }
+
+    /// Whether the encoder of an axis does not move while its motor pulls and is to pull with all it has. Where commands are lost, drives go on with
+    /// older ones.
+    // Out of line, for the size of four copies.
+    #[inline(never)]
+    fn strains(&self, axis: Axis, readings: &Readings) -> bool {
+        let excess = axis.of(&self.excess);
+        let pull = axis.of(&readings.torque) * excess.signum();
+        let greatest = axis.of(&self.arm.drive.motor_torque_limit);
+        excess != 0.0 && readings.is_still(axis) && pull >= PULLS * greatest
     }
 
     /// What need not be done in every sample. Looks for chatter, and accounts for the heat of the motors: too much of it slows down the moves
@@ -106,7 +116,7 @@ impl Controller {
         let rise = &self.arm.limits.effort_rise_time;
         if let Some((axis, percent)) = self.chatter.look(limit, rise, period) {
             let limit = f32::from(CHATTER_PERCENT);
-            self.blame(axis, Fault::value(Cause::Chatter, percent, limit));
+            self.blame(axis, Cause::Chatter, percent, limit);
         }
         let part = samples as f32 * period / self.setup.thermal_time;
         // Of each motor by itself.
@@ -116,7 +126,7 @@ impl Controller {
         let (axis, heat) = self.heat.account(torques, &continuous, part);
         let limit = f32::from(OVERLOAD_PERCENT);
         if heat > limit * 1e-2 {
-            self.blame(axis, Fault::value(Cause::Overload, heat * 100.0, limit));
+            self.blame(axis, Cause::Overload, heat * 100.0, limit);
         }
         let pace = heat::pace(heat);
         if pace < 1.0 {
@@ -132,8 +142,43 @@ impl Controller {
         }
     }
 
-    fn blame(&mut self, axis: Axis, fault: Fault) {
+    /// Plans, or watches axes that stand where there is nothing to plan: in one sample of some, whose turn it is; in manual operation, where a moment
+    /// counts, in each, and then rather than planning where it is its turn. Returns whether there was anything to plan.
+    pub fn plan_or_watch(&mut self, readings: &Readings, is_turn: bool) -> bool {
+        let is_manual = self.operation == Operation::Manual;
+        let planned = !(is_manual && is_turn) && self.plan();
+        if !planned && (is_manual || is_turn) {
+            self.watch_stance(readings);
+        }
+        planned
+    }
+
+    /// Blames the encoder of an axis that stands while its loop makes more and more of that. With a law that does not, the axis does not move.
+    // Out of line: in one sample of ten.
+    #[inline(never)]
+    fn watch_stance(&mut self, readings: &Readings) {
+        if self.limp || !self.state.is_powered() || self.state.is_braking() {
+            return;
+        }
+        let drive = &self.body.drive;
+        let gains = &self.setup.selection.gains;
+        let corner = gains.observer.max(self.least_corner);
+        let stiffness = self.body.nominal_inertia * (gains.proportional() + corner / self.period);
+        let count = stiffness.component_mul(&drive.own_count());
+        let effort = self.observer.residual();
+        let found = (self.stance).look(readings, effort, drive.coulomb(), &count);
+        if let Some((axis, growth, bound)) = found {
+            self.blame(axis, Cause::StuckSensor, growth, bound);
+        }
+    }
+
+    // Out of line, for the size of six copies.
+    #[inline(never)]
+    fn blame(&mut self, axis: Axis, cause: Cause, value: f32, limit: f32) {
         let axis = axis.into();
-        self.fail(Fault { axis, ..fault });
+        self.fail(Fault {
+            axis,
+            ..Fault::value(cause, value, limit)
+        });
     }
 }

@@ -148,6 +148,18 @@ impl Drive {
         Vector4::from(counts.map(|n| n as f32)) * self.count
     }
 
+    /// What each axis by itself moves by in a count of its encoder: rad, rad, m, rad.
+    #[must_use]
+    pub fn own_count(&self) -> Vector4<f32> {
+        Vector4::repeat(self.count).component_div(&self.ratio)
+    }
+
+    /// Dry friction of the joints, N m, lift N.
+    #[must_use]
+    pub fn coulomb(&self) -> &Vector4<f32> {
+        &self.coulomb
+    }
+
     /// Encoder readings nearest to motor angles `phi` (rad), saturated to the range; 0 for NaN.
     ///
     /// Not on the control path: for drives in tests, the inverse of [`Drive::motor_angle_of_counts`].
