@@ -20,6 +20,7 @@
 
 mod balance;
 mod blend;
+mod cost;
 mod cruise;
 mod jump;
 mod survey;
