@@ -21,6 +21,7 @@ const LEAST_PACE: f32 = 0.5;
 /// Share of the torque that moves are slowed down to.
 const EASED: f32 = 0.97;
 
+type Answer = (u8, Result<(), Refusal>);
 /// Result of [`MoveQueue::advance`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
@@ -61,8 +62,8 @@ pub struct MoveQueue {
     cool: f32,
     /// In manual operation: whether somebody holds it.
     held: Option<bool>,
-    /// Whether the last sample followed a curve of the tool.
-    followed_curve: bool,
+    /// Whether the last sample followed a curve of the tool, which makes it expensive.
+    pub(crate) followed_curve: bool,
     /// Where the last planned move ends: the next one starts there.
     plan_end: Vector4<f32>,
     completed: u8,
@@ -223,18 +224,8 @@ impl MoveQueue {
         self.is_busy() || !(self.requests.is_empty() || self.moves.is_full())
     }
 
-    /// Whether the last sample followed a curve of the tool, which makes it expensive.
-    pub fn followed_curve(&self) -> bool {
-        self.followed_curve
-    }
-
-    /// A step of planning, and further ones as long as all of them [take](Planner::cost) at most `room` instructions. Returns the number
-    /// of a request and its answer once there is one.
-    pub fn plan(
-        &mut self,
-        budget: &TorqueBudget<'_>,
-        room: u16,
-    ) -> Option<(u8, Result<(), Refusal>)> {
+    /// A step of planning, and more as long as all of them [take](Planner::cost) at most `room` instructions. Returns an answer once there is one.
+    pub fn plan(&mut self, budget: &TorqueBudget<'_>, room: u16) -> Option<Answer> {
         let mut taken = 0_u16;
         loop {
             let after = taken.saturating_add(self.planner.cost());
@@ -250,7 +241,7 @@ impl MoveQueue {
     }
 
     /// One step of planning.
-    fn step(&mut self, budget: &TorqueBudget<'_>) -> Option<(u8, Result<(), Refusal>)> {
+    fn step(&mut self, budget: &TorqueBudget<'_>) -> Option<Answer> {
         if self.planner.is_blending() {
             self.find_overlap(budget);
             return None;

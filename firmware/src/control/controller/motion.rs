@@ -58,7 +58,7 @@ impl Controller {
             return 0;
         } else if self.stands {
             STANDING
-        } else if self.queue.followed_curve() {
+        } else if self.queue.followed_curve {
             return 0;
         } else {
             MOVING
