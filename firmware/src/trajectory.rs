@@ -161,9 +161,9 @@ impl Trajectory {
     /// # Errors
     /// A curve of the tool that has not been surveyed by the planner may leave the reach; a planned one cannot.
     pub fn at(&self, arm: &ArmModel, t: f32) -> Result<Reference, PathError> {
-        let mut setpoint = Setpoint::rest(Vector4::zeros());
-        self.evaluate(arm, t, None, &mut setpoint)?;
-        Ok(setpoint.reference)
+        let mut reference = Reference::rest(self.end);
+        self.evaluate(arm, t, &mut reference, None)?;
+        Ok(reference)
     }
 
     /// As [`Trajectory::at`], and how the arm should move `lead` seconds later: at the place of that instant, but for the third
@@ -178,7 +178,8 @@ impl Trajectory {
         lead: f32,
         setpoint: &mut Setpoint,
     ) -> Result<(), PathError> {
-        self.evaluate(arm, t, Some(lead), setpoint)
+        let Setpoint { reference, ahead } = setpoint;
+        self.evaluate(arm, t, reference, Some((lead, ahead)))
     }
 
     /// Adds the motion of the next move, at its time `t`, to that of this one.
@@ -212,15 +213,17 @@ impl Trajectory {
         &self,
         arm: &ArmModel,
         t: f32,
-        lead: Option<f32>,
-        setpoint: &mut Setpoint,
+        reference: &mut Reference,
+        ahead: Option<(f32, &mut Rates)>,
     ) -> Result<(), PathError> {
         let scale = self.time_scale;
-        let later = lead.map(|lead| (t + lead) * scale);
+        let (later, ahead) = match ahead {
+            Some((lead, ahead)) => (Some((t + lead) * scale), Some(ahead)),
+            None => (None, None),
+        };
         let t = t * scale;
         let now = self.profile.at(t - self.start);
         let then = later.map_or(now, |later| self.profile.at(later - self.start));
-        let Setpoint { reference, ahead } = setpoint;
         let squared = scale * scale;
         match &self.path {
             // As below, without what is zero: nearly every move is one of these.
@@ -228,16 +231,18 @@ impl Trajectory {
                 reference.q = start + delta * now.s;
                 reference.qd = delta * (now.v * scale);
                 reference.qdd = delta * (now.a * squared);
-                if lead.is_some() {
-                    ahead.qd = delta * (then.v * scale);
-                    ahead.qdd = delta * (then.a * squared);
-                }
                 if let Some(lift) = lift {
                     let now = lift.at(t);
-                    let then = later.map_or(now, |later| lift.at(later));
                     reference.q.z = now.s;
                     (reference.qd.z, reference.qdd.z) = (now.v * scale, now.a * squared);
-                    (ahead.qd.z, ahead.qdd.z) = (then.v * scale, then.a * squared);
+                }
+                if let (Some(later), Some(ahead)) = (later, ahead) {
+                    ahead.qd = delta * (then.v * scale);
+                    ahead.qdd = delta * (then.a * squared);
+                    if let Some(lift) = lift {
+                        let then = lift.at(later);
+                        (ahead.qd.z, ahead.qdd.z) = (then.v * scale, then.a * squared);
+                    }
                 }
             }
             path @ Path::Tool { .. } => {
@@ -246,8 +251,10 @@ impl Trajectory {
                 reference.q = q;
                 reference.qd = dq * (now.v * scale);
                 reference.qdd = (dq * now.a + ddq * (now.v * now.v)) * squared;
-                ahead.qd = dq_then * (then.v * scale);
-                ahead.qdd = (dq_then * then.a + ddq * (then.v * then.v)) * squared;
+                if let Some(ahead) = ahead {
+                    ahead.qd = dq_then * (then.v * scale);
+                    ahead.qdd = (dq_then * then.a + ddq * (then.v * then.v)) * squared;
+                }
             }
         }
         Ok(())

@@ -53,7 +53,7 @@ impl<'a> Run<'a> {
         };
         queue.push(request).unwrap();
         while queue.has_to_plan() {
-            if let Some((_, answer)) = queue.plan(&budget) {
+            if let Some((_, answer)) = queue.plan(&budget, 0) {
                 answer.ok()?;
             }
         }
@@ -320,7 +320,7 @@ fn ride(from: &Vector4<f32>, to: &Vector4<f32>, ride: &Ride) -> Result<(), TestC
     };
     run.queue.push(request).unwrap();
     while run.queue.has_to_plan() {
-        if let Some((_, answer)) = run.queue.plan(&run.budget) {
+        if let Some((_, answer)) = run.queue.plan(&run.budget, 0) {
             prop_assert!(answer.is_ok());
         }
     }

@@ -44,10 +44,9 @@ use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use crate::trajectory::{Reference, Setpoint};
 use requests::Answer;
 
-/// Planning steps per millisecond of the sampling period.
-const PLANNING_STEPS_PER_MS: f32 = 1.0;
-/// Most planning steps per sample: below 100 Hz, planning is no faster than at 100 Hz.
-const MAX_PLANNING_STEPS: f32 = 10.0;
+/// How often per sample its room for planning is used, at the most: once for each millisecond of its period; below 100 Hz, planning is no
+/// faster than at 100 Hz.
+const MAX_PLANNING_TURNS: f32 = 10.0;
 
 /// Configuration, fixed at start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -94,8 +93,10 @@ pub struct Controller {
     state: State,
     /// Samples that a gap in the feedback may span.
     max_gap: u32,
-    /// Planning steps per sample.
-    planning_steps: u8,
+    /// How often per sample its room for planning is used.
+    planning_turns: u8,
+    /// Whether this sample follows no move.
+    stands: bool,
     /// Limits that have acted since this was last taken.
     limits: LimitFlags,
     /// How the arm is operated.
@@ -162,11 +163,9 @@ impl Controller {
             setup: config.setup,
             state: State::SelfTest,
             max_gap: config.setup.monitor.gap_samples(config.period.seconds()),
-            planning_steps: clamp(
-                config.period.seconds() * 1e3 * PLANNING_STEPS_PER_MS + 0.5,
-                1.0,
-                MAX_PLANNING_STEPS,
-            ) as u8,
+            planning_turns: clamp(config.period.seconds() * 1e3 + 0.5, 1.0, MAX_PLANNING_TURNS)
+                as u8,
+            stands: false,
             limits: LimitFlags::EMPTY,
             operation: Operation::Automatic,
             held: 0,

@@ -7,15 +7,23 @@ use super::torque_budget::{Ramp, TorqueBudget, ratio, slower};
 use crate::mechanics::math::{cbrt, sqrt};
 
 impl TorqueBudget<'_> {
-    /// The largest time scale, at most 1, at which these joint accelerations and jerks use no more than `share` of the limits.
+    /// The largest time scale, at most 1, at which these joint accelerations, and the jerks since those `time` s before, use no more than
+    /// `share` of the limits.
     #[cold]
-    pub fn cap_scale(&self, qdd: &Vector4<f32>, jerk: &Vector4<f32>, share: f32) -> f32 {
+    pub fn cap_scale(
+        &self,
+        qdd: &Vector4<f32>,
+        before: &Vector4<f32>,
+        time: f32,
+        share: f32,
+    ) -> f32 {
+        let jerk = (qdd - before) / time;
         let limits = &self.arm.limits;
         let within = |limit: &Vector4<f32>, value: &Vector4<f32>| {
             ratio((limit * share).as_slice(), value.as_slice())
         };
         let acceleration = sqrt(within(&limits.acceleration, qdd)).min(1.0);
-        acceleration.min(cbrt(within(&limits.jerk, jerk)))
+        acceleration.min(cbrt(within(&limits.jerk, &jerk)))
     }
 
     /// Keeps a change of the time scale within the limits, with this share of the jerk: of a trajectory whose motion is `rest`, and

@@ -20,6 +20,7 @@
 
 mod balance;
 mod blend;
+mod cost;
 mod cruise;
 mod jump;
 mod survey;
@@ -35,15 +36,17 @@ use super::request::{Request, Target, from_path};
 use super::torque_budget::TorqueBudget;
 use super::{Reference, Trajectory};
 use crate::mechanics::arm::ArmModel;
+use crate::mechanics::body::Torques;
 use blend::Blend;
 use jump::{Chamfer, Jump};
 use survey::{Apex, fill};
-use verify::Before;
+use verify::Pass;
 
 /// Corrections of the accelerations.
 const ROUNDS: u8 = 3;
-/// Samples of each half of the profile in one round.
-const BALANCE_POINTS: u8 = 3;
+/// Samples of each half of the profile in one round, one next to rest and one next to the peak speed; the last round looks at the
+/// middle between them, too.
+const ENDS: u8 = 2;
 /// Largest factor by which one sample of a round changes an acceleration.
 const STEP: f32 = 1.6;
 /// Least speed of the tool that can be asked for, m/s: across the work space that takes hours.
@@ -113,31 +116,24 @@ enum Stage {
     },
     /// Both strokes over the travel.
     Overlay,
-    Verify {
-        time_scale: f32,
-        /// The sample before.
-        before: Option<Before>,
-    },
+    Verify,
     /// Its motion is known.
     Load {
         /// Time of the sample, s.
         t: f32,
-        time_scale: f32,
-        before: Option<Before>,
         reference: Reference,
     },
-    /// All samples have been checked.
-    Finish {
-        time_scale: f32,
+    /// It needs more torque than there is, or a change of it that is too fast.
+    Solve {
+        /// Its torques, and speeds.
+        full: Torques,
+        qd: Vector4<f32>,
+        /// Change of the torques since the sample before, and the time that they have for it, s.
+        change: Torques,
+        time: f32,
     },
-}
-
-impl Stage {
-    /// The last pass, from its beginning.
-    const VERIFY: Self = Self::Verify {
-        time_scale: 1.0,
-        before: None,
-    };
+    /// All samples have been checked.
+    Finish,
 }
 
 /// Incremental planner; holds one request at a time.
@@ -152,6 +148,9 @@ pub struct Planner {
     /// Of an arc: where the arm is most nearly stretched, as a share of the way; in the last pass, when, s. Torques peak there within a
     /// small part of the time.
     apex: f32,
+    pass: Pass,
+    /// Whether the robot has limits of acceleration and jerk.
+    caps: bool,
     /// Whether moves are for manual operation, in which the [tool](super::tool_speed) is slow.
     slow_tool: bool,
 }
@@ -162,10 +161,10 @@ impl Planner {
         let locate = 2;
         let survey = MOST_PARTS as u32 + 1 + cruise::PLACES as u32 + 3;
         let compose = ROUNDS as u32 + 1;
-        let balance = ROUNDS as u32 * 2 * BALANCE_POINTS as u32;
-        // Its ends, its apex, and the borders of the travel's segments; motion and torques. A jump has fewer steps than an arc, and the borders of
+        let balance = 2 * (ROUNDS as u32 * ENDS as u32 + 1);
+        // Its ends, its apex, and the borders of the travel's segments; motion, torques and scale. A jump has fewer steps than an arc, and the borders of
         // its strokes.
-        let verify = 2 * (2 * MOST_PARTS as u32 + 3 + 12);
+        let verify = 3 * (2 * MOST_PARTS as u32 + 3 + 12);
         let finish = 1;
         locate + survey + compose + balance + jump::STEPS + verify + finish
     };
@@ -195,6 +194,8 @@ impl Planner {
             speed: 1.0,
             jump: None,
             apex: 0.0,
+            pass: Pass::begin(),
+            caps: false,
             slow_tool: false,
         }
     }
@@ -278,17 +279,21 @@ impl Planner {
                 point,
                 wanted,
             } => self.balance(budget, round, point, wanted),
-            Stage::Verify { time_scale, before } => self.verify(budget, time_scale, before),
-            Stage::Load {
-                t,
-                time_scale,
-                before,
-                reference,
-            } => {
-                self.load(budget, (t, time_scale, before), &reference);
+            Stage::Verify => self.verify(budget),
+            Stage::Load { t, reference } => {
+                self.load(budget, t, &reference);
                 Ok(())
             }
-            Stage::Finish { time_scale } => self.finish(budget, time_scale),
+            Stage::Solve {
+                full,
+                qd,
+                change,
+                time,
+            } => {
+                self.solve(budget, (&full, &qd), (&change, time));
+                Ok(())
+            }
+            Stage::Finish => self.finish(budget),
         };
         if step.is_err() {
             self.stage = Stage::Idle;
@@ -333,6 +338,7 @@ impl Planner {
         self.draft.path = path;
         self.draft.start = 0.0;
         self.draft.time_scale = 1.0;
+        self.caps = arm.limits.caps_acceleration();
         // For a path along which nothing moves.
         self.draft.profile = SCurve::default();
         self.stage = Stage::Survey {
@@ -370,20 +376,20 @@ impl Planner {
             self.draft.profile = SCurve::new(1.0, &self.bounds);
         }
         self.draft.span = self.draft.profile.duration();
-        self.stage = if travels && round < ROUNDS {
-            Stage::Balance {
+        if travels && round < ROUNDS {
+            self.stage = Stage::Balance {
                 round,
                 point: 0,
                 wanted: [0.0; 2],
-            }
+            };
         } else if self.jump.is_some() {
-            Stage::Raise { down: false }
+            self.stage = Stage::Raise { down: false };
         } else {
             if self.draft.path.is_arc() {
                 self.apex = self.draft.profile.time_at(self.apex);
             }
-            Stage::VERIFY
-        };
+            self.begin_pass();
+        }
     }
 }
 

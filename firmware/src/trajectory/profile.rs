@@ -160,28 +160,22 @@ impl SCurve {
     /// with it the torque's rate of change.
     #[inline(never)]
     pub fn border_after(&self, t: f32) -> f32 {
-        let (there, back) = (&self.accelerate, &self.brake);
-        let third = 1.0 / 3.0;
-        let mut border = 0.0;
-        for segment in [
-            there.ramp,
-            there.hold,
-            third * there.fall,
-            third * there.fall,
-            third * there.fall,
-            self.cruise,
-            third * back.fall,
-            third * back.fall,
-            third * back.fall,
-            back.hold,
-            back.ramp,
-        ] {
-            if border > t {
-                break;
+        let speeding = self.accelerate.duration();
+        let braking = speeding + self.cruise;
+        if t < 0.0 {
+            0.0
+        } else if t < speeding {
+            self.accelerate.border_after(t)
+        } else if t < braking {
+            braking
+        } else {
+            let left = self.duration() - t;
+            if left <= 0.0 {
+                f32::INFINITY
+            } else {
+                self.duration() - self.brake.border_before(left)
             }
-            border += segment;
         }
-        if border > t { border } else { f32::INFINITY }
     }
 
     /// Motion at `t`; at rest at the start before it, and at the end after it.

@@ -5,6 +5,7 @@ use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
 use super::clock::Clock;
+use super::path::Path;
 use super::planner::Planner;
 use super::request::Request;
 use super::torque_budget::{RAMP_SHARE, STOP_SHARE, TorqueBudget};
@@ -20,6 +21,7 @@ const LEAST_PACE: f32 = 0.5;
 /// Share of the torque that moves are slowed down to.
 const EASED: f32 = 0.97;
 
+type Answer = (u8, Result<(), Refusal>);
 /// Result of [`MoveQueue::advance`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
@@ -60,6 +62,8 @@ pub struct MoveQueue {
     cool: f32,
     /// In manual operation: whether somebody holds it.
     held: Option<bool>,
+    /// Whether the last sample followed a curve of the tool, which makes it expensive.
+    pub(crate) followed_curve: bool,
     /// Where the last planned move ends: the next one starts there.
     plan_end: Vector4<f32>,
     completed: u8,
@@ -78,6 +82,7 @@ impl MoveQueue {
             found: 1.0,
             cool: 1.0,
             held: None,
+            followed_curve: false,
             plan_end: Vector4::zeros(),
             completed: 0,
         }
@@ -219,8 +224,24 @@ impl MoveQueue {
         self.is_busy() || !(self.requests.is_empty() || self.moves.is_full())
     }
 
-    /// One step of planning. Returns the number of a request and its answer once there is one.
-    pub fn plan(&mut self, budget: &TorqueBudget<'_>) -> Option<(u8, Result<(), Refusal>)> {
+    /// A step of planning, and more as long as all of them [take](Planner::cost) at most `room` instructions. Returns an answer once there is one.
+    pub fn plan(&mut self, budget: &TorqueBudget<'_>, room: u16) -> Option<Answer> {
+        let mut taken = 0_u16;
+        loop {
+            let after = taken.saturating_add(self.planner.cost());
+            if taken > 0 && after > room {
+                return None;
+            }
+            taken = after;
+            let answer = self.step(budget);
+            if answer.is_some() || self.planner.is_idle() {
+                return answer;
+            }
+        }
+    }
+
+    /// One step of planning.
+    fn step(&mut self, budget: &TorqueBudget<'_>) -> Option<Answer> {
         if self.planner.is_blending() {
             self.find_overlap(budget);
             return None;
@@ -307,6 +328,7 @@ impl MoveQueue {
             trajectory = next;
             duration = next.duration();
         }
+        self.followed_curve = matches!(trajectory.path, Path::Tool { .. });
         let (sequence, ended) = (trajectory.sequence, t >= duration);
         self.now = t;
         let ahead = self.clock.lead(lead);

@@ -52,16 +52,6 @@ pub struct Ramp {
 }
 
 impl TorqueBudget<'_> {
-    /// What a motion along a path at the speed `v` along it, 1/s, needs.
-    pub fn need(&self, here: &PathPoint, v: f32) -> Need {
-        let rest = Reference {
-            q: here.q,
-            qd: here.dq * v,
-            qdd: here.ddq * (v * v),
-        };
-        self.split(&rest, &here.dq)
-    }
-
     /// The acceleration along the path, 1/s², and the jerk, 1/s³, that the torques and their rates of change allow an arm at rest.
     pub fn from_rest(&self, here: &PathPoint) -> (f32, f32) {
         let push = self.body.inertial(&self.couplings(&here.q), &here.dq);
@@ -75,20 +65,23 @@ impl TorqueBudget<'_> {
     /// By what factor the path acceleration of `along` could grow before the first torque
     /// reaches its share; huge where the sample needs hardly any.
     pub fn acceleration_room(&self, here: &PathPoint, along: &Sample) -> f32 {
-        let mut need = self.need(here, along.v);
-        need.push *= along.a;
+        let Sample { v, a, .. } = *along;
+        let couplings = self.couplings(&here.q);
+        let push = self.torques(&self.body.inertial(&couplings, &(here.dq * a)));
+        let rest = self.load(&couplings, &(here.dq * v), &(here.ddq * (v * v)));
         // Not by `rooms`, which looks both ways: it costs 190 instructions more in what is the dearest step of planning.
         let limits = &self.body.planned_torque;
         let mut room = f32::MAX;
-        for ((push, rest), limit) in need.push.iter().zip(need.rest.iter()).zip(limits.iter()) {
-            let (need, rest) = if *push < 0.0 {
-                (-push, -rest)
+        for ((push, rest), limit) in push.iter().zip(rest.iter()).zip(limits.iter()) {
+            let left = if *push < 0.0 {
+                limit + rest
             } else {
-                (*push, *rest)
+                limit - rest
             };
+            let need = push.abs();
             // Less than a hundredth of the limit: another sample decides.
-            if need > 0.01 * limit {
-                room = room.min((limit - rest) / need);
+            if need > 0.01 * limit && left < room * need {
+                room = left / need;
             }
         }
         room
@@ -131,24 +124,28 @@ impl TorqueBudget<'_> {
         let couplings = self.couplings(&rest.q);
         Need {
             push: self.torques(&self.body.inertial(&couplings, push)),
-            rest: self.load(&couplings, rest),
+            rest: self.load(&couplings, &rest.qd, &rest.qdd),
         }
     }
 
     // Out of line, for the size of one copy.
     #[inline(never)]
     fn couplings(&self, q: &Vector4<f32>) -> Couplings {
-        self.body.lagrange.couplings(&Trig::relative(q))
+        self.body.lagrange.couplings(&Trig::relative_in_line(q))
     }
 
     /// Torques of a motion.
     #[inline(never)]
-    fn load(&self, couplings: &Couplings, Reference { qd, qdd, .. }: &Reference) -> Torques {
-        let Self { arm, body } = self;
-        let torque = body.frictionless(couplings, qd, qdd)
-            + arm.drive.viscous.component_mul(qd)
-            + body.drive.coulomb_friction(qd);
-        self.torques(&torque)
+    fn load(&self, couplings: &Couplings, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Torques {
+        let dry = self.body.drive.coulomb_friction(qd);
+        self.torques(&(self.smooth(couplings, qd, qdd) + dry))
+    }
+
+    /// Joint torques of a motion without Coulomb friction.
+    #[inline(always)]
+    fn smooth(&self, couplings: &Couplings, qd: &Vector4<f32>, qdd: &Vector4<f32>) -> Vector4<f32> {
+        let viscous = self.arm.drive.viscous.component_mul(qd);
+        self.body.frictionless(couplings, qd, qdd) + viscous
     }
 
     /// How far `push` may go down and up from none before it and `rest` together need more than their share of a torque.
@@ -201,28 +198,46 @@ impl TorqueBudget<'_> {
 
     /// The largest time scale, at most 1, at which `reference` keeps the torque limits of joints and motors, of an arm that
     /// [can creep](Self::check_creep); and its torques without Coulomb friction, which sets in at once.
+    // Out of line, for the size of one copy.
     #[inline(never)]
     pub fn torque_scale(&self, reference: &Reference) -> (f32, Torques) {
-        let full = self.load(&self.couplings(&reference.q), reference);
-        let dry = self.body.drive.coulomb_friction(&reference.qd);
-        let smooth = full - self.torques(&dry);
-        let limits = &self.body.planned_torque;
-        // Nearly every sample keeps its limits as it is: then there is nothing to solve.
-        let scale = if within(&full, limits) {
+        let (full, smooth) = self.torques_of(reference);
+        let scale = if self.keeps_torque(&full) {
             1.0
         } else {
-            // tau(x) = a x² + b x + c. Coulomb friction does not depend on x.
-            let viscous = self.arm.drive.viscous.component_mul(&reference.qd);
-            let b = self.torques(&viscous);
-            let c = self.torques(&(self.body.lagrange.gravity() + dry));
-            let a = full - b - c;
-            let mut scale = 1.0f32;
-            for (((a, b), c), limit) in a.iter().zip(b.iter()).zip(c.iter()).zip(limits.iter()) {
-                scale = least(scale, scale_within(*a, *b, *c, *limit));
-            }
-            scale
+            self.scale_of(&full, &reference.qd)
         };
         (scale, smooth)
+    }
+
+    /// The torques of a motion; and those without Coulomb friction.
+    #[inline(never)]
+    pub fn torques_of(&self, reference: &Reference) -> (Torques, Torques) {
+        let Reference { q, qd, qdd } = reference;
+        let smooth = self.torques(&self.smooth(&self.couplings(q), qd, qdd));
+        let dry = self.torques(&self.body.drive.coulomb_friction(qd));
+        (smooth + dry, smooth)
+    }
+
+    /// Whether torques keep their limits.
+    pub fn keeps_torque(&self, torque: &Torques) -> bool {
+        within(torque, &self.body.planned_torque)
+    }
+
+    /// The largest time scale, at most 1, at which a motion with the speeds `qd` keeps the torque limits, where it has these torques at 1.
+    #[inline(never)]
+    pub fn scale_of(&self, torque: &Torques, qd: &Vector4<f32>) -> f32 {
+        // tau(x) = a x² + b x + c. Coulomb friction does not depend on x.
+        let b = self.torques(&self.arm.drive.viscous.component_mul(qd));
+        let dry = self.body.drive.coulomb_friction(qd);
+        let c = self.torques(&(self.body.lagrange.gravity() + dry));
+        let a = torque - b - c;
+        let limits = &self.body.planned_torque;
+        let mut scale = 1.0f32;
+        for (((a, b), c), limit) in a.iter().zip(b.iter()).zip(c.iter()).zip(limits.iter()) {
+            scale = least(scale, scale_within(*a, *b, *c, *limit));
+        }
+        scale
     }
 
     /// The largest time scale, at most 1, at which torques change no faster than by `change` within `time` s.
@@ -231,6 +246,11 @@ impl TorqueBudget<'_> {
         let ratio = ratio(rates.as_slice(), change.as_slice());
         // All but a small part of the change is inertial, and goes with the cube of the time scale.
         if ratio < 1.0 { cbrt(ratio) } else { 1.0 }
+    }
+
+    /// Whether it is 1.
+    pub fn keeps_rate(&self, change: &Torques, time: f32) -> bool {
+        within(change, &(self.body.torque_rate * (VERIFIED_RATE * time)))
     }
 
     fn torques(&self, joint: &Vector4<f32>) -> Torques {
@@ -243,11 +263,19 @@ impl TorqueBudget<'_> {
 
     /// The largest time scale, at most 1, at which the joint speeds `qd` use no more than `share` of the limits of joints and
     /// motors. Lift and wrist share one.
+    #[inline(never)]
     pub fn speed_scale(&self, qd: &Vector4<f32>, share: f32) -> f32 {
         let joint = ratio((self.arm.limits.velocity * share).as_slice(), qd.as_slice());
         let motor = self.arm.drive.motor_speed_limit * share;
         let speed = self.body.drive.motor_speed(qd);
         least(joint, ratio(motor.as_slice(), speed.as_slice()))
+    }
+
+    /// The same of the motor alone that lift and wrist share, for a motion whose joints keep their own limits.
+    pub fn shared_speed_scale(&self, qd: &Vector4<f32>) -> f32 {
+        let limit = self.arm.drive.motor_speed_limit.z;
+        let speed = self.body.drive.motor_speed(qd).z.abs();
+        if speed > limit { limit / speed } else { 1.0 }
     }
 
     /// Largest joint speeds: the joint's own limit or the motor's, whichever is lower.
@@ -369,31 +397,4 @@ fn largest_scale(a: f32, b: f32, room: f32) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Against the formula for the roots of a parabola, in f64.
-    #[test]
-    fn the_scale_is_the_root() {
-        for overload in [1.001, 1.01, 1.05, 1.2, 1.5, 2.0, 4.0, 8.0f64] {
-            for share in [-0.9, -0.5, -0.1, 0.0, 0.3, 0.7, 1.0f64] {
-                // a + b = 1, of which a is this share; a parabola that opens downwards still rises at 1.
-                let (a, b, room) = (share, 1.0 - share, 1.0 / overload);
-                let root = (b * b + 4.0 * a * room).max(0.0).sqrt();
-                let wanted = 2.0 * room / (b + root);
-                let found = f64::from(largest_scale(a as f32, b as f32, room as f32));
-                let error = found / wanted - 1.0;
-                // From below never past the root, though slowly where the parabola is flat.
-                let (below, above) = match (share < 0.0, overload > 2.0) {
-                    (true, _) => (-2e-2, 1e-5),
-                    (false, true) => (-1e-5, 6e-3),
-                    (false, false) => (-1e-5, 1e-5),
-                };
-                assert!(
-                    error > below && error < above,
-                    "{overload} {share}: {found} {wanted}"
-                );
-            }
-        }
-    }
-}
+mod tests;

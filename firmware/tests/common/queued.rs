@@ -67,7 +67,7 @@ pub(crate) fn run(
     }
     let mut steps = 0;
     while queue.has_to_plan() {
-        queue.plan(&budget);
+        queue.plan(&budget, 0);
         steps += 1;
         assert!(steps < 2000, "planning does not end");
     }

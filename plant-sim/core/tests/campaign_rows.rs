@@ -133,7 +133,7 @@ name = "gate, 22 kg"
 scenario = "gate"
 set = ["cycles=1"]
 payload = 22
-begin_ms = { from = 250, until = 750, step = 0.7 }
+begin_ms = { from = 170, until = 670, step = 0.7 }
 
 [[situation]]
 name = "emergency stop, 10 kg"

@@ -106,7 +106,7 @@ fn a_short_run_is_drawn_sample_by_sample() {
 
 #[test]
 fn a_long_run_takes_no_more_room_and_keeps_its_peaks() {
-    let (drawing, truths, _) = run(&gate(10, 2000.0));
+    let (drawing, truths, _) = run(&gate(11, 2000.0));
     let length = drawing.to_string().len();
     assert!(length < 1_300_000, "{length} bytes");
     let per_value = drawing["samples_per_value"].as_u64().unwrap();

@@ -177,7 +177,7 @@ fn rejected(record: &Record) -> u16 {
 #[test]
 fn a_poor_masquerade_changes_no_torque() {
     let (_, without) = gate("payload:dropped@100s");
-    for fault in ["feedback:masquerade@400.5ms", "feedback:masquerade@400.7ms"] {
+    for fault in ["feedback:masquerade@300.5ms", "feedback:masquerade@300.7ms"] {
         let (summary, with) = gate(fault);
         assert!(summary.completed, "{fault}: {:?}", summary.error);
         assert_eq!(first_difference(&with, &without), None, "{fault}");

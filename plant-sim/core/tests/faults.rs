@@ -54,20 +54,20 @@ fn modes(record: &Record) -> Vec<Mode> {
         .collect()
 }
 
-/// In motion at 0.4 s.
+/// In motion at 0.32 s.
 const CASES: [(&str, Cause); 12] = [
-    ("feedback:loss@0.4s", Cause::PeerSilent),
-    ("feedback:corrupt@0.4s", Cause::Corrupted),
-    ("feedback:bad-value@0.4s", Cause::BadValue),
-    ("drives:silent@0.4s", Cause::PeerSilent),
-    ("controller:slow=0.002@0.4s", Cause::Overrun),
-    ("encoder:elbow:stuck@0.4s", Cause::StuckSensor),
-    ("encoder:shoulder:jump=0.5@0.4s", Cause::EncoderFault),
-    ("encoder:elbow:reversed@0.4s", Cause::EncoderFault),
-    ("motor:elbow:dead@0.4s", Cause::FollowingError),
-    ("motor:shoulder:runaway@0.4s", Cause::FollowingError),
-    ("motor:lift:dead@0.41s", Cause::FollowingError),
-    ("encoder:elbow:bit=18@0.4s", Cause::EncoderFault),
+    ("feedback:loss@0.32s", Cause::PeerSilent),
+    ("feedback:corrupt@0.32s", Cause::Corrupted),
+    ("feedback:bad-value@0.32s", Cause::BadValue),
+    ("drives:silent@0.32s", Cause::PeerSilent),
+    ("controller:slow=0.002@0.32s", Cause::Overrun),
+    ("encoder:elbow:stuck@0.32s", Cause::StuckSensor),
+    ("encoder:shoulder:jump=0.5@0.32s", Cause::EncoderFault),
+    ("encoder:elbow:reversed@0.32s", Cause::EncoderFault),
+    ("motor:elbow:dead@0.32s", Cause::FollowingError),
+    ("motor:shoulder:runaway@0.32s", Cause::FollowingError),
+    ("motor:lift:dead@0.33s", Cause::FollowingError),
+    ("encoder:elbow:bit=18@0.32s", Cause::EncoderFault),
 ];
 
 #[test]
@@ -94,7 +94,7 @@ fn a_lying_encoder_gets_no_controlled_stop() {
         for axis in ["shoulder", "elbow", "lift", "wrist"] {
             for at in 0..40 {
                 // Until the second move ends.
-                let text = format!("encoder:{axis}:{defect}@{}ms", 50 + 17 * at);
+                let text = format!("encoder:{axis}:{defect}@{}ms", 50 + 15 * at);
                 let (summary, record) = run(&[&text], 0);
                 match cause(&record) {
                     Cause::StuckSensor if defect == "stuck" => {}
@@ -124,8 +124,8 @@ fn a_jump_is_told_of_its_own_axis() {
         ("square", "elbow", -0.02184, 879.64),
         ("square", "elbow", -0.02486, 604.76),
         ("square", "elbow", -0.02392, 875.24),
-        ("gate", "lift", 0.00213, 603.91),
-        ("gate", "wrist", 0.86573, 938.29),
+        ("gate", "lift", 0.00213, 520.91),
+        ("gate", "wrist", 0.86573, 838.29),
     ] {
         let mut scenario = Scenario::built_in(name).expect("it is built in");
         scenario.cycles = 1;
@@ -144,11 +144,11 @@ fn a_jump_is_told_of_its_own_axis() {
 #[test]
 fn a_jump_that_no_axis_can_make_is_told_at_once_at_a_low_rate() {
     for (rate, axis, jump, at) in [
-        (100.0, "lift", -0.0275, 0.45),
-        (125.0, "lift", -0.0205, 0.54),
+        (100.0, "lift", -0.0275, 0.36),
+        (125.0, "lift", -0.0205, 0.46),
         (100.0, "shoulder", 0.096, 0.3),
-        (100.0, "wrist", -0.371, 0.6),
-        (250.0, "elbow", 0.1025, 0.33),
+        (100.0, "wrist", -0.371, 0.51),
+        (250.0, "elbow", 0.1025, 0.25),
     ] {
         let mut scenario = Scenario::built_in("gate").expect("it is built in");
         (scenario.cycles, scenario.rate_hz) = (1, rate);
@@ -176,11 +176,11 @@ fn feedback_that_is_repeated_without_end_keeps_nobody_from_switching_off() {
 /// The controller hears nothing of its commands being lost; the drives brake by themselves.
 #[test]
 fn the_drives_brake_when_commands_stop_arriving() {
-    for text in ["command:loss@0.4s", "controller:silent@0.4s"] {
+    for text in ["command:loss@0.32s", "controller:silent@0.32s"] {
         let (summary, record) = run(&[text], 0);
         assert!(!summary.completed, "{text}");
         let commands = |(time, frame): &&(Instant, CanFrame)| {
-            table::COMMAND.identifies(frame) && time.seconds() > 0.4005
+            table::COMMAND.identifies(frame) && time.seconds() > 0.3205
         };
         assert_eq!(record.frames.iter().filter(commands).count(), 0, "{text}");
         let last = record.truths.last().expect("a run has samples").plant;
@@ -192,14 +192,14 @@ fn the_drives_brake_when_commands_stop_arriving() {
 #[test]
 fn a_few_bad_frames_are_ridden_out() {
     for text in [
-        "feedback:loss@0.4s..0.402s",
-        "feedback:duplicate@0.4s..0.402s",
-        "command:loss@0.4s..0.403s",
-        "command:duplicate@0.4s..0.6s",
-        "command:corrupt@0.4s..0.403s",
-        "state:loss@0.3s..0.5s",
+        "feedback:loss@0.32s..0.322s",
+        "feedback:duplicate@0.32s..0.322s",
+        "command:loss@0.32s..0.323s",
+        "command:duplicate@0.32s..0.52s",
+        "command:corrupt@0.32s..0.323s",
+        "state:loss@0.22s..0.42s",
         "motionreply:duplicate@0s",
-        "feedback:jitter=0.0001@0.3s..0.5s",
+        "feedback:jitter=0.0001@0.22s..0.42s",
     ] {
         let (summary, record) = run(&[text], 1);
         assert!(summary.completed, "{text}: {:?}", cause(&record));
@@ -208,7 +208,7 @@ fn a_few_bad_frames_are_ridden_out() {
 
 #[test]
 fn chance_follows_the_seed_alone() {
-    let frames = |seed| run(&["command:loss=0.2@0.3s..0.5s"], seed).1.frames;
+    let frames = |seed| run(&["command:loss=0.2@0.22s..0.42s"], seed).1.frames;
     assert_eq!(frames(7), frames(7));
     assert_ne!(frames(7), frames(8));
 }
@@ -235,11 +235,11 @@ fn a_fault_outside_the_run_changes_nothing() {
 #[test]
 fn a_payload_that_falls_is_felt() {
     let (_, sound) = run(&[], 0);
-    let (_, dropped) = run(&["payload:dropped@0.4s"], 0);
+    let (_, dropped) = run(&["payload:dropped@0.32s"], 0);
     let differs = |(a, b): (&Truth, &Truth)| a.plant.q != b.plant.q;
     let first = sound.truths.iter().zip(&dropped.truths).position(differs);
     let time = first.map(|index| sound.truths[index].plant.t);
-    assert!(time.is_some_and(|t| (0.4..0.402).contains(&t)), "{time:?}");
+    assert!(time.is_some_and(|t| (0.32..0.322).contains(&t)), "{time:?}");
 }
 
 #[test]

@@ -51,17 +51,17 @@ fn the_weight_is_taken_over_without_a_step() {
 #[test]
 fn a_lift_whose_brake_is_stuck_open_is_held_when_the_arm_fails() {
     for fault in [
-        "motor:elbow:dead@0.5s",
-        "motor:elbow:dip@0.5s..0.52s",
-        "motor:elbow:weak=0.2@0.45s",
-        "motor:shoulder:runaway@0.45s",
-        "encoder:elbow:stuck@0.45s",
-        "encoder:shoulder:reversed@0.45s",
-        "encoder:elbow:jump=0.3@0.45s",
-        "encoder:elbow:noise=0.01@0.45s",
-        "encoder:shoulder:slow=0.02@0.45s",
+        "motor:elbow:dead@0.42s",
+        "motor:elbow:dip@0.42s..0.44s",
+        "motor:elbow:weak=0.2@0.37s",
+        "motor:shoulder:runaway@0.37s",
+        "encoder:elbow:stuck@0.37s",
+        "encoder:shoulder:reversed@0.37s",
+        "encoder:elbow:jump=0.3@0.37s",
+        "encoder:elbow:noise=0.01@0.37s",
+        "encoder:shoulder:slow=0.02@0.37s",
     ] {
-        let (summary, record) = with_22_kg(&["brake:stuck-open@0.3s", fault]);
+        let (summary, record) = with_22_kg(&["brake:stuck-open@0.22s", fault]);
         assert!(!summary.completed, "{fault}");
         let told = summary.faults[0].time_s;
         let after: Vec<_> = record
@@ -91,12 +91,12 @@ fn a_lift_whose_brake_is_stuck_open_is_held_when_the_arm_fails() {
 /// stuck open.
 #[test]
 fn a_lift_at_rest_stays_where_it_is_when_the_arm_fails() {
-    for brake in [None, Some("brake:stuck-open@0.3s")] {
-        let jump = "encoder:elbow:jump=1@0.45s";
+    for brake in [None, Some("brake:stuck-open@0.22s")] {
+        let jump = "encoder:elbow:jump=1@0.37s";
         let faults: Vec<&str> = brake.into_iter().chain([jump]).collect();
         let (summary, record) = with_22_kg(&faults);
         assert!(!summary.completed, "{faults:?}");
-        let after = record.truths.iter().filter(|it| it.plant.t > 0.4495);
+        let after = record.truths.iter().filter(|it| it.plant.t > 0.3695);
         let places = after.map(|it| it.plant.q[LIFT]);
         let (highest, lowest) = places.fold((f64::MAX, f64::MIN), |(high, low), place| {
             (high.min(place), low.max(place))
@@ -128,7 +128,7 @@ fn the_drives_word_of_the_brake_comes_first() {
         // Open from the first sample on, at rest.
         ("brake:stuck-open@0s", 0.1),
         // While it moves: with the next sample.
-        ("brake:stuck-closed@0.4s", 0.402),
+        ("brake:stuck-closed@0.32s", 0.322),
         ("brake:stuck-closed@while=lift-down", 1.0),
     ] {
         let (summary, record) = with_22_kg(&[fault]);
@@ -136,7 +136,7 @@ fn the_drives_word_of_the_brake_comes_first() {
         let told = &summary.faults[0];
         assert_eq!(told.cause, "drive-fault", "{fault}");
         assert!(told.time_s < by, "{fault}: {}", told.time_s);
-        if by < 0.4 {
+        if by < 0.3 {
             let enabled = |it: &sim::observer::Truth| it.mind.mode == Mode::Enabled;
             assert!(!record.truths.iter().any(enabled), "{fault}");
         }

@@ -110,11 +110,11 @@ fn a_babbling_node_stops_the_arm() {
 /// Its time goes on by itself then: drives whose feedback cannot be read are silent.
 #[test]
 fn bad_feedback_without_end_does_not_silence_the_controller() {
-    for fault in ["feedback:corrupt@0.4s", "feedback:bad-value@0.4s"] {
+    for fault in ["feedback:corrupt@0.32s", "feedback:bad-value@0.32s"] {
         let (summary, record) = gate(fault);
         assert!(!summary.completed, "{fault}");
         let beats = record.frames.iter().filter(|(time, frame)| {
-            time.seconds() > 0.6 && table::CONTROLLER_HEARTBEAT.identifies(frame)
+            time.seconds() > 0.52 && table::CONTROLLER_HEARTBEAT.identifies(frame)
         });
         assert!(beats.count() > 2, "{fault}");
         let told = summary

@@ -76,11 +76,11 @@ fn frames_that_came_in_vain_are_told() {
             "no reply to request 1 (stop) within 2.0 s; 1 came and had to be refused: end-to-end CRC is wrong",
         ),
         (
-            "motion:forged@0.3s",
+            "motion:forged@0.22s",
             "jump refused: No more motions can be queued; another node sends the requests of the operator as well",
         ),
         (
-            "motion:forged@0.5s",
+            "motion:forged@0.42s",
             "the move did not end within 120 s at 1 of full speed; another node sends the requests of the operator as well",
         ),
     ] {
@@ -88,7 +88,7 @@ fn frames_that_came_in_vain_are_told() {
         assert!(error.contains(expected), "{fault}: {error}");
     }
     // Nobody takes for a request what has another CRC.
-    assert_eq!(run(&["motion:masquerade@0.3s"]).0.error, None);
+    assert_eq!(run(&["motion:masquerade@0.22s"]).0.error, None);
 }
 
 /// 64 states ago, 1.28 s, the controller was about to start: neither is that believed, nor does it keep the operator waiting.
@@ -102,7 +102,7 @@ fn an_old_state_is_no_news() {
 fn a_controller_that_starts_anew_is_told_from_a_silent_one() {
     let (summary, _) = run(&["State:loss@0.3s..0.7s"]);
     assert_eq!(summary.error, None);
-    for dead in ["dead@0.45s..+20ms", "dead@0.5s..+5ms"] {
+    for dead in ["dead@0.37s..+20ms", "dead@0.42s..+5ms"] {
         let (summary, _) = run(&[&format!("controller:{dead}")]);
         let error = summary.error.unwrap();
         assert!(

@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn beginnings_count_from_what_is_named() {
-        let text = DEFAULT.replace("{ from = 250", "{ after = \"jump2\", from = 250");
+        let text = DEFAULT.replace("{ from = 170", "{ after = \"jump2\", from = 170");
         let case = crossing(&text).unwrap().case(0, 0).unwrap();
         assert!(case.faults.is_empty());
         let texts: Vec<_> = (1..crossing(&text).unwrap().len())
@@ -180,7 +180,7 @@ mod tests {
             .map(|case| case.faults[0].text.clone())
             .collect();
         assert!(
-            texts.iter().all(|text| text.contains("@jump2+250ms..+2ms")),
+            texts.iter().all(|text| text.contains("@jump2+170ms..+2ms")),
             "{texts:?}"
         );
     }
@@ -189,7 +189,7 @@ mod tests {
     fn what_cannot_be_crossed_is_refused_with_what_is_allowed() {
         for (from, to, why) in [
             ("step = 0.7", "step = 0", "begin_ms.step is 0"),
-            ("from = 250", "from = 2500", "is before begin_ms.from"),
+            ("from = 170", "from = 1700", "is before begin_ms.from"),
             ("lasts_ms = [2,", "lasts_ms = [-2,", "lasts_ms is -2"),
             (
                 "lasts_ms = [2,",

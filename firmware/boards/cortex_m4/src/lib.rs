@@ -1,4 +1,4 @@
-//! Common to the boards with a Cortex-M4F: a stack guard and fault handlers that stop safely.
+//! Common to the boards with a Cortex-M4F: a stack guard, fault handlers that stop safely, copies of memory.
 //!
 //! The stack is at the bottom of RAM and grows down. Below it the memory protection unit denies all access: an overflow
 //! faults before anything is overwritten. Every fault ends here, as do panics and requested resets: torque off, the
@@ -12,6 +12,8 @@
 mod fault;
 #[cfg(target_os = "none")]
 mod guard;
+#[cfg(target_os = "none")]
+mod memory;
 
 #[cfg(target_os = "none")]
 pub use fault::{last_stop, restart};

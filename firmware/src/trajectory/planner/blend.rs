@@ -251,8 +251,7 @@ impl Blend {
             let time = self.instant - before.t;
             scale = least(scale, budget.rate_scale(&(torque - before.torque), time));
             if arm.limits.caps_acceleration() {
-                let jerk = (qdd - before.qdd) / time;
-                scale = least(scale, budget.cap_scale(qdd, &jerk, CAP_SHARE));
+                scale = least(scale, budget.cap_scale(qdd, &before.qdd, time, CAP_SHARE));
             }
         }
         (scale >= FULL).then_some(())

@@ -25,7 +25,7 @@ const HEIGHTS: u8 = 5;
 const EQUAL: f32 = 1e-4;
 /// Instants at which stroke and travel are compared at each end, and how many in one step.
 const KNOTS: u8 = 8;
-const KNOTS_A_STEP: u8 = 2;
+const KNOTS_A_STEP: u8 = 4;
 /// Share of the travel from which on the other end may be the nearer one. The tool follows an arc at a varying pace, so that
 /// it need not be half way when the travel is.
 const OTHER_END: f32 = 0.3;
@@ -210,10 +210,13 @@ impl Planner {
         let (Some(jump), Some(lift)) = (&mut self.jump, self.draft.path.lift()) else {
             return;
         };
+        let (travel_back, stroke_back);
         let (travel, stroke) = if down {
-            (self.draft.profile.reversed(), lift.down.reversed())
+            travel_back = self.draft.profile.reversed();
+            stroke_back = lift.down.reversed();
+            (&travel_back, &stroke_back)
         } else {
-            (self.draft.profile, lift.up)
+            (&self.draft.profile, &lift.up)
         };
         let (free_from, beyond) = (jump.free_from(down), jump.free_from(!down));
         let (mut knot, mut lead) = (knot, lead);
@@ -236,7 +239,9 @@ impl Planner {
                 };
                 return;
             };
-            for _ in 0..KNOTS_A_STEP {
+            // To an end that the compiler does not know: it would write the body four times.
+            let end = (knot + KNOTS_A_STEP).min(KNOTS);
+            while knot < end {
                 knot += 1;
                 let t = f32::from(knot) * step;
                 let across = travel.at(t);
@@ -294,12 +299,12 @@ impl Planner {
         self.draft.span = wanted.max(needed);
         lift.down_start = self.draft.span - lift.down.duration();
         let next = jump.next(needed - wanted);
-        self.stage = if next == jump.raise || jump.round >= HEIGHTS {
-            Stage::VERIFY
+        if next == jump.raise || jump.round >= HEIGHTS {
+            self.begin_pass();
         } else {
             jump.raise = next;
-            Stage::Stroke { down: false }
-        };
+            self.stage = Stage::Stroke { down: false };
+        }
     }
 }
 

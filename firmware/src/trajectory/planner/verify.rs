@@ -28,6 +28,25 @@ pub(super) fn share(draft: &Trajectory) -> f32 {
     }
 }
 
+/// The last pass so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pass {
+    /// The largest time scale at which its samples keep every limit.
+    time_scale: f32,
+    /// The last of them.
+    before: Option<Before>,
+}
+
+impl Pass {
+    /// Before its first sample.
+    pub(super) fn begin() -> Self {
+        Self {
+            time_scale: 1.0,
+            before: None,
+        }
+    }
+}
+
 /// A sample of the last pass or of an overlap, for the one after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Before {
@@ -40,72 +59,87 @@ pub(super) struct Before {
 }
 
 impl Planner {
-    /// One sample of the whole move.
+    /// Begins the last pass.
+    pub(super) fn begin_pass(&mut self) {
+        self.pass = Pass::begin();
+        self.stage = Stage::Verify;
+    }
+
+    /// One sample of the whole move: its motion.
     #[inline(never)]
-    pub(super) fn verify(
-        &mut self,
-        budget: &TorqueBudget<'_>,
-        time_scale: f32,
-        before: Option<Before>,
-    ) -> Result<(), Refusal> {
+    pub(super) fn verify(&mut self, budget: &TorqueBudget<'_>) -> Result<(), Refusal> {
+        let before = self.pass.before.as_ref();
         let t = before.map_or(0.0, |before| self.next_sample(before.t));
-        let reference = self.draft.at(budget.arm, t).map_err(from_path)?;
-        let scale = budget.speed_scale(&reference.qd, share(&self.draft));
-        self.stage = Stage::Load {
-            t,
-            time_scale: least(time_scale, scale),
-            before,
-            reference,
+        // In place: what is returned would be copied on the way.
+        let mut reference = Reference::rest(self.draft.end);
+        let evaluated = self.draft.evaluate(budget.arm, t, &mut reference, None);
+        evaluated.map_err(from_path)?;
+        let scale = match self.draft.path {
+            // The speed along the path keeps that of every joint, and a stroke that of the lift.
+            Path::Joint { .. } => budget.shared_speed_scale(&reference.qd),
+            Path::Tool { .. } => budget.speed_scale(&reference.qd, TOOL_SHARE),
         };
+        self.pass.time_scale = least(self.pass.time_scale, scale);
+        self.stage = Stage::Load { t, reference };
         Ok(())
     }
 
     /// Its torques.
     #[inline(never)]
-    pub(super) fn load(
+    pub(super) fn load(&mut self, budget: &TorqueBudget<'_>, t: f32, reference: &Reference) {
+        let Reference { qd, qdd, .. } = *reference;
+        let (full, torque) = budget.torques_of(reference);
+        let now = Before { t, torque, qdd };
+        let before = self.pass.before.replace(now).unwrap_or(now);
+        let (time, share) = (t - before.t, share(&self.draft));
+        let change = torque - before.torque;
+        if self.caps && time > 0.0 {
+            let scale = budget.cap_scale(&qdd, &before.qdd, time, CAP_SHARE * share);
+            self.pass.time_scale = least(self.pass.time_scale, scale);
+        }
+        let time = share * time;
+        // Nearly every sample keeps its limits as it is: then there is nothing to solve.
+        if budget.keeps_torque(&full) && budget.keeps_rate(&change, time) {
+            self.go_on(t);
+        } else {
+            self.stage = Stage::Solve {
+                full,
+                qd,
+                change,
+                time,
+            };
+        }
+    }
+
+    /// Its time scale, where it needs too much torque or a change of it that is too fast.
+    #[inline(never)]
+    pub(super) fn solve(
         &mut self,
         budget: &TorqueBudget<'_>,
-        (t, time_scale, before): (f32, f32, Option<Before>),
-        reference: &Reference,
+        (full, qd): (&Torques, &Vector4<f32>),
+        (change, time): (&Torques, f32),
     ) {
-        let (torque_scale, torque) = budget.torque_scale(reference);
-        let mut time_scale = least(time_scale, torque_scale);
-        if let Some(before) = before {
-            let time = t - before.t;
-            let change = torque - before.torque;
-            let share = share(&self.draft);
-            time_scale = least(time_scale, budget.rate_scale(&change, share * time));
-            if budget.arm.limits.caps_acceleration() {
-                let jerk = (reference.qdd - before.qdd) / time;
-                let scale = budget.cap_scale(&reference.qdd, &jerk, CAP_SHARE * share);
-                time_scale = least(time_scale, scale);
-            }
-        }
+        let scale = least(budget.scale_of(full, qd), budget.rate_scale(change, time));
+        self.pass.time_scale = least(self.pass.time_scale, scale);
+        self.go_on(self.pass.before.map_or(0.0, |before| before.t));
+    }
+
+    /// To the sample after the one at `t`.
+    fn go_on(&mut self, t: f32) {
         self.stage = if t < self.draft.span {
-            Stage::Verify {
-                time_scale,
-                before: Some(Before {
-                    t,
-                    torque,
-                    qdd: reference.qdd,
-                }),
-            }
+            Stage::Verify
         } else {
-            Stage::Finish { time_scale }
+            Stage::Finish
         };
     }
 
     /// Makes the draft the trajectory.
     #[inline(never)]
-    pub(super) fn finish(
-        &mut self,
-        budget: &TorqueBudget<'_>,
-        time_scale: f32,
-    ) -> Result<(), Refusal> {
+    pub(super) fn finish(&mut self, budget: &TorqueBudget<'_>) -> Result<(), Refusal> {
         // Past the end, so that rounding in the last sample cannot leave the arm short of it.
         let past = self.draft.span + 1.0;
         self.draft.end = self.draft.at(budget.arm, past).map_err(from_path)?.q;
-        self.draft.time_scale = time_scale * self.speed;
+        self.draft.time_scale = self.pass.time_scale * self.speed;
         self.stage = Stage::Idle;
         Ok(())
     }
@@ -150,8 +184,14 @@ impl Planner {
                 down_start,
                 ..
             } = lift;
-            next = least(next, up.border_after(soon));
-            next = least(next, down_start + down.border_after(soon - down_start));
+            // The descent begins no sooner than the rise has ended.
+            let since = soon - down_start;
+            let border = if since < 0.0 {
+                least(up.border_after(soon), *down_start)
+            } else {
+                down_start + down.border_after(since)
+            };
+            next = least(next, border);
         }
         // Nor may the last one follow at once: a rate over no time is rounding.
         if span - next < 0.05 * step {

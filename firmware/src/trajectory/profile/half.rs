@@ -32,6 +32,8 @@ pub(super) struct Growth {
 }
 
 impl Growth {
+    // Out of line, for the size of one copy.
+    #[inline(never)]
     pub(super) fn new(bounds: &HalfBounds, jerk: f32) -> Self {
         let HalfBounds {
             jerk: own,
@@ -143,6 +145,32 @@ pub(super) struct Half {
 impl Half {
     pub(super) fn duration(&self) -> f32 {
         self.ramp + self.hold + self.fall
+    }
+
+    /// First border after `t`, from rest: up to the duration.
+    pub(super) fn border_after(&self, t: f32) -> f32 {
+        let mut border = self.ramp;
+        if border <= t {
+            border += self.hold;
+        }
+        // Rounding must not let the last third end before the half does.
+        let third = THIRD * self.fall;
+        for _ in 0..2 {
+            if border <= t {
+                border += third;
+            }
+        }
+        if border <= t { self.duration() } else { border }
+    }
+
+    /// Last border before `t`, from rest.
+    pub(super) fn border_before(&self, t: f32) -> f32 {
+        let third = THIRD * self.fall;
+        let held = self.ramp + self.hold;
+        [held + 2.0 * third, held + third, held, self.ramp]
+            .into_iter()
+            .find(|border| *border < t)
+            .unwrap_or(0.0)
     }
 
     /// At the end of the first segment.
