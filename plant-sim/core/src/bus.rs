@@ -170,6 +170,14 @@ impl BuiltinBus {
         self.next = self.foreseen();
     }
 
+    /// Whether something that is wrong has changed what becomes of a frame; of what does not wait for frames, always.
+    pub fn has_hit(&self, what: Wrong) -> bool {
+        match what {
+            Wrong::Disturbance(number) => self.interference.has_hit(number),
+            Wrong::Affliction(_) => true,
+        }
+    }
+
     /// Has the software of a node that has just gone bus-off wait until then before it tells its controller to recover.
     ///
     /// # Panics

@@ -9,7 +9,7 @@ pub mod defect;
 pub mod drive;
 pub mod encoder;
 mod energy;
-mod factor;
+pub(crate) mod factor;
 mod friction;
 mod integrator;
 pub mod kinematics;

@@ -118,6 +118,13 @@ fn situation(spec: &SituationSpec) -> Result<Situation, String> {
             .carry(kg)
             .map_err(|why| wrong(format!("payload {kg}: {why}")))?;
     }
+    if let Some(own) = scenario.faults.first() {
+        return Err(wrong(format!(
+            "scenario {} has faults of its own, such as {:?}, which would be judged as if the campaign had drawn them; leave them out with \
+             set = [\"faults=[]\"], or name another scenario",
+            spec.scenario, own.text
+        )));
+    }
     let config = RunConfig::new(scenario);
     config.rig().map_err(|error| wrong(error.to_string()))?;
     let Begin {
@@ -201,6 +208,11 @@ mod tests {
             ("payload = 22", "payload = -22", "payload"),
             ("cycles=1", "cycles=0", "cycles"),
             ("name = ", "nam = ", "unknown field"),
+            (
+                "scenario = \"gate\"",
+                "scenario = \"encoder-fault\"",
+                "leave them out with set = [\"faults=[]\"]",
+            ),
             (
                 "{ from = 250",
                 "{ after = \"jmp2\", from = 250",

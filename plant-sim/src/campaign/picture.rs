@@ -98,6 +98,8 @@ mod tests {
                     missed: BTreeSet::new(),
                     survived: distance_mm.is_none(),
                     never_began: false,
+                    never_acted: false,
+                    unseen: Vec::new(),
                     detected: None,
                     detection_ms: None,
                     standstill_ms: distance_mm,

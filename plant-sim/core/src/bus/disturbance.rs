@@ -1,5 +1,7 @@
 //! Disturbances of the bus: which attempt to send a frame fails, and where in it.
 
+use std::cell::Cell;
+
 use oorandom::Rand64;
 use protocol::schema::MessageInfo;
 use protocol::time::Instant;
@@ -84,6 +86,8 @@ struct Source {
     /// In [0, 1).
     chance: f64,
     place: u64,
+    /// Whether an attempt has suffered it.
+    has_hit: Cell<bool>,
 }
 
 /// All disturbances of a bus. Chances are drawn once an attempt, so that looking ahead changes nothing.
@@ -106,6 +110,7 @@ impl Interference {
             random: Rand64::new(u128::from(seed) << 64 | 1 << 32 | number),
             chance: 0.0,
             place: 0,
+            has_hit: Cell::new(false),
         };
         (0..=self.attempts).for_each(|_| source.draw());
         self.sources.push(source);
@@ -116,6 +121,11 @@ impl Interference {
     pub(super) fn retime(&mut self, number: usize, from: Instant, until: Instant) {
         let disturbance = &mut self.sources[number].disturbance;
         (disturbance.from, disturbance.until) = (from, until);
+    }
+
+    /// Whether an attempt has suffered this disturbance.
+    pub(super) fn has_hit(&self, number: usize) -> bool {
+        self.sources[number].has_hit.get()
     }
 
     /// Draws the chances of the next attempt.
@@ -136,14 +146,21 @@ impl Interference {
                 return None;
             };
             let concerned = info.identifies(&mailbox.frame);
-            concerned.then(|| Hit::new(kind, mailbox.anatomy(), source.place))
+            concerned.then(|| {
+                source.has_hit.set(true);
+                Hit::new(kind, mailbox.anatomy(), source.place)
+            })
         })
     }
 
     /// Whether the node reads a wrong CRC in a frame that starts at `start`.
     pub(super) fn misleads(&self, start: Instant, node: NodeId) -> bool {
         let reader = Disturbed::Reader(node);
-        self.acting(start).any(|it| it.disturbance.what == reader)
+        let mut misleading = self
+            .acting(start)
+            .filter(|it| it.disturbance.what == reader);
+        let found = misleading.next();
+        found.inspect(|it| it.has_hit.set(true)).is_some()
     }
 
     fn acting(&self, start: Instant) -> impl Iterator<Item = &Source> {

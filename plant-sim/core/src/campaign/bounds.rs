@@ -4,6 +4,8 @@
 //! |---|---|
 //! | no motor is asked for more than its peak torque, and for none while torque is not enabled | model |
 //! | an axis off its reference, too fast or out of its range is reported at the 4th sample in a row | default parameters: three samples, and one to answer |
+//! | in manual operation a tool faster than 250 mm/s is reported at the 4th sample in a row | ISO 10218-1; a tool is whatever lies within 100 mm of the axis of the flange |
+//! | and it is nowhere faster than that and what the greatest torques add to it in 8 samples, and free fall in the 30 ms of the brake | until then a fault may drive the arm |
 //! | torque is off 0.7 s after a fault was reported, with 22 kg | 1.25 times the time in which the slowest axis of the stretched arm stops from full speed with the torque that its weight leaves, and the time of the brake |
 //! | a brake that stays open is reported 60 ms and 8 samples after it was to close | the time of the brake, and of two controllers' answers |
 //! | while torque is on after that, the tool travels no further than at its greatest speed for the time of such a stop | the same |
@@ -12,15 +14,17 @@
 //! | the lift goes down no further than under the greatest torque for 8 samples, in free fall for 30 ms, and what brake or motor need to stop it | the drives hold the last torque; the brake closes in 30 ms |
 //! | after standstill nothing moves by a tenth of a millimetre | what stands, stands |
 
-use nalgebra::Vector4;
+use nalgebra::{Vector4, Vector6};
 use protocol::messages::{Command, ControlWord};
 use protocol::time::Duration;
 
+use crate::maths::hypot;
 use crate::model::{Payload, RobotModel};
 use crate::observer::Truth;
 use crate::plant::arm::{Arm, Configuration};
 use crate::plant::brake::Brake;
 use crate::plant::drive::Drive;
+use crate::plant::factor::Factor;
 use crate::plant::stop::EndStops;
 
 const LIFT: usize = 2;
@@ -44,6 +48,9 @@ const STOP_MARGIN: f64 = 1.25;
 const BRAKE_S: f64 = 0.03;
 /// The controller waits this long for the brake, s.
 const BRAKE_WAIT_S: f64 = 0.06;
+/// Speed of the tool in manual operation, m/s, at every point within so many m of the axis of the flange.
+const TOOL_SPEED: f64 = 0.25;
+const TOOL_REACH: f64 = 0.1;
 /// Movement of a standing axis that does not count, rad and m.
 pub const STANDING: f64 = 1e-4;
 /// Rounding of f32 and of the integrator.
@@ -58,10 +65,11 @@ pub struct Bounds {
     stops: EndStops,
     payload: f64,
     period: f64,
+    is_manual: bool,
 }
 
 impl Bounds {
-    /// The bounds for `model`, sampled every `period` seconds, with nothing in the gripper.
+    /// The bounds for `model`, sampled every `period` seconds, with nothing in the gripper, in automatic operation.
     pub fn new(model: &RobotModel, period: f64) -> Self {
         let (arm, drive) = (Arm::new(model, None), Drive::new(&model.drive));
         let stretched = arm.mass_matrix(&arm.at(&Vector4::zeros())) + drive.rotor_inertia();
@@ -72,7 +80,13 @@ impl Bounds {
             stops: EndStops::new(&model.limits, &stretched.diagonal()),
             payload: 0.0,
             period,
+            is_manual: false,
         }
+    }
+
+    /// The same in manual operation, or not.
+    pub fn in_manual_operation(self, is_manual: bool) -> Self {
+        Self { is_manual, ..self }
     }
 
     /// Takes a payload into account. One that falls out of the gripper still counts: it falls on something.
@@ -98,7 +112,7 @@ impl Bounds {
 
     /// Whether an axis has been off its reference, too fast, or out of its range for so many samples in a row that it has to have been
     /// reported; `counts` counts them.
-    pub fn is_long_beyond(&self, counts: &mut [u32; 3], truth: &Truth) -> bool {
+    pub fn is_long_beyond(&self, counts: &mut [u32; 4], truth: &Truth) -> bool {
         let Truth { plant, mind } = truth;
         let beyond = self.is_beyond(&plant.q, &plant.qd, &mind.q);
         for (count, is_beyond) in counts.iter_mut().zip(beyond) {
@@ -107,8 +121,8 @@ impl Bounds {
         counts.iter().any(|count| *count > SAMPLES_TO_REPORT)
     }
 
-    /// Whether an axis is off its reference, too fast, or out of its range.
-    fn is_beyond(&self, q: &[f64; 4], qd: &[f64; 4], reference: &[f64; 4]) -> [bool; 3] {
+    /// Whether an axis is off its reference, too fast, or out of its range, or the tool too fast.
+    fn is_beyond(&self, q: &[f64; 4], qd: &[f64; 4], reference: &[f64; 4]) -> [bool; 4] {
         let limits = &self.model.limits;
         let any = |of: &dyn Fn(usize) -> bool| (0..4).any(of);
         [
@@ -122,7 +136,42 @@ impl Bounds {
                 let room = RANGE_MARGIN[i] + ROUNDING;
                 !(limits.lower[i] - room..=limits.upper[i] + room).contains(&q[i])
             }),
+            self.is_manual && self.tool_speed(q, qd) > TOOL_SPEED * (1.0 + ROUNDING),
         ]
+    }
+
+    /// Speed of the fastest point that may be one of the tool, m/s.
+    pub fn tool_speed(&self, q: &[f64; 4], qd: &[f64; 4]) -> f64 {
+        let at = self.arm.at(&Vector4::from(*q));
+        tool_speed(&self.arm.twist(&at, &Vector4::from(*qd)))
+    }
+
+    /// Whether the tool is faster than a fault may make it until the arm is stopped.
+    pub fn is_tool_too_fast(&self, q: &[f64; 4], qd: &[f64; 4]) -> bool {
+        let excess = if self.is_manual {
+            self.tool_speed(q, qd) - TOOL_SPEED
+        } else {
+            0.0
+        };
+        if excess <= 0.0 {
+            return false;
+        }
+        let at = self.arm.at(&Vector4::from(*q));
+        let inertia = Factor::of(&(self.arm.mass_matrix(&at) + self.drive.rotor_inertia()));
+        let motors = Vector4::from(self.model.drive.motor_torque_limit);
+        let effort = self.drive.joint_effort(&motors);
+        let driven = |signs: u32| {
+            let signed = Vector4::from_fn(|i, _| {
+                if signs >> i & 1 == 0 {
+                    effort[i]
+                } else {
+                    -effort[i]
+                }
+            });
+            tool_speed(&self.arm.twist(&at, &inertia.solve(&signed)))
+        };
+        let greatest = (0..8).map(driven).fold(0.0, f64::max);
+        excess > greatest * to_brake_s(self.period) + self.model.gravity.max(0.0) * BRAKE_S
     }
 
     /// Kinetic energy of arm, rotors and payload, J.
@@ -215,6 +264,14 @@ impl Bounds {
     fn lifted(&self) -> f64 {
         self.model.links[2].mass + self.model.links[3].mass + self.payload
     }
+}
+
+/// Speed of the fastest point of the tool where the flange has this velocity.
+fn tool_speed(flange: &Vector6<f64>) -> f64 {
+    hypot(
+        hypot(flange[0], flange[1]) + TOOL_REACH * flange[5].abs(),
+        flange[2],
+    )
 }
 
 /// Way and speed after `time` at this acceleration.

@@ -4,7 +4,7 @@
 
 use protocol::messages::{Cause, Node};
 use protocol::schema::Content;
-use protocol::time::Instant;
+use protocol::time::{Duration, Instant};
 
 use super::bounds::FOLLOWING_ERROR;
 use super::spells::Spell;
@@ -39,10 +39,22 @@ const OFF_THE_BUS: &[Cause] = &[
     Cause::PeerSilent,
     Cause::DriveFault,
 ];
-/// Counter or sample of the feedback stand or go backwards; at 500 Hz, one from a sample before is late already.
-const OLD: &[Cause] = &[Cause::Reordered, Cause::Late];
+/// Counter or sample of the feedback stand or go backwards; at 500 Hz, one from a sample before is late already, and below 400 Hz each takes the
+/// place of one that is missed.
+const OLD: &[Cause] = &[Cause::Reordered, Cause::Late, Cause::FeedbackLost];
+/// An arm that nobody commands has left its reference.
+pub(super) const LEFT: &[Cause] = &[Cause::FollowingError, Cause::OverSpeed, Cause::SoftLimit];
+/// Frames stay out while the arm is to get its torque, or for several reasons: what is told depends on how far it has come, and on which is there
+/// again first.
+pub(super) const OUT: &[Cause] = &[
+    Cause::DriveFault,
+    Cause::Late,
+    Cause::FeedbackLost,
+    Cause::PeerSilent,
+    Cause::Reordered,
+];
 /// The loop closes on a reading that is not so.
-const LIE: &[Cause] = &[
+pub(super) const LIE: &[Cause] = &[
     Cause::EncoderFault,
     Cause::StuckSensor,
     Cause::Collision,
@@ -184,9 +196,12 @@ fn of_frames(content: Content, kind: FrameFault) -> Option<&'static [Cause]> {
     })
 }
 
+/// Longest time until a report that waits for nothing but its turn is there.
+const REPORT: Duration = Duration::from_millis(40);
+
 /// Whether such a fault may end a run without a word of the controller: nobody is there to command the arm, or to be told; or the arm `was_off`, and
 /// what the controller says of that waits behind a command that nobody acknowledges.
-pub(super) fn may_be_untold(spell: &Spell, was_off: bool) -> bool {
+pub(super) fn may_be_untold(spell: &Spell, was_off: bool, end: Instant) -> bool {
     let stays = spell.until == Instant::MAX;
     match spell.what {
         What::Silent(Node::Operator)
@@ -196,6 +211,8 @@ pub(super) fn may_be_untold(spell: &Spell, was_off: bool) -> bool {
         | What::NoRecovery(Node::Controller)
         | What::Silent(Node::Controller)
         | What::Dead(Node::Controller) => true,
+        // It says so in its sixth answer, and the drives have let go long before.
+        What::Slow(seconds) => spell.from + Duration::from_seconds(6.0 * seconds) + REPORT > end,
         // A word gets through once the bus is free.
         What::Babbling(_) | What::Wires(_) => stays,
         What::Attempts(info, ErrorKind::Ack, _) if info.content == Content::Command => stays && was_off,

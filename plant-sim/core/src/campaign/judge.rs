@@ -9,32 +9,19 @@ use protocol::time::{Duration, Instant, Period};
 use protocol::{codec, table};
 
 use super::bounds::{Bounds, STANDING};
-use super::expect::Expected;
-use super::lift::Lift;
+use super::course::{Course, Known};
+use super::due::Stage;
 use super::newest::Newest;
 use super::reports::{Reports, is_at_rest, is_faulty};
 use super::request::Request;
 use super::spells::Spells;
 use super::verdict::{Requirement, Verdict, round};
 use crate::faults::Fault;
-use crate::maths::square;
 use crate::model::Payload;
 use crate::observer::{Observer, PlantState, Truth};
 use crate::scenario::Ending;
 use crate::setup::RunConfig;
 use crate::world::CellEvent;
-
-/// J that energies may differ by: a tenth of what a hand feels.
-const ENERGY_TOLERANCE: f64 = 0.1;
-
-/// The arm at the moment of a change.
-#[derive(Clone, Copy, Debug)]
-struct Mark {
-    time: f64,
-    lift: f64,
-    /// Of the motion and of the springs of the end stops, J.
-    energy: f64,
-}
 
 /// The observer who judges a run with faults.
 #[derive(Clone)]
@@ -49,27 +36,26 @@ pub struct Judge {
     reports: Reports,
     /// When the drives switched off by themselves, and in which mode of the controller.
     cut: Option<(f64, Mode)>,
-    /// The arm when the fault was detected.
-    detected: Option<Mark>,
-    /// The arm when torque went off, since when it has stayed off.
-    off: Option<Mark>,
     /// Samples in a row with an axis beyond each kind of limit.
-    beyond: [u32; 3],
+    beyond: [u32; 4],
     last: Option<PlantState>,
-    /// End of the last motion.
-    moving: f64,
-    distance: f64,
-    /// Of `distance`, what was travelled under torque after the detection.
-    driven: f64,
-    fastest: f64,
-    energy: f64,
-    lift: Lift,
+    course: Course,
     /// The arm when the run had ended.
     rest: Option<PlantState>,
     /// How the scenario is to end.
     ends: Ending,
     mode: Mode,
     survived: bool,
+    /// Which faults had acted by then.
+    acted: Vec<bool>,
+    /// Since when it has been what it is.
+    stage: Stage,
+    /// When the arm last got its torque, and when it last had some.
+    powered: Option<[Instant; 2]>,
+    /// The newest sample that it can have answered when it reported a fault; up to then, the newest of all.
+    reported_at: Option<u32>,
+    /// Whether the controller has switched it off for a fault.
+    let_go: bool,
     /// Whether it completed, and the drives let go while it was being switched off.
     ended_switching_off: bool,
 }
@@ -81,7 +67,8 @@ impl Judge {
         let period = Period::of_rate(scenario.rate_hz);
         let mut judge = Self {
             period,
-            bounds: Bounds::new(&config.actual, period.duration().seconds()),
+            bounds: Bounds::new(&config.actual, period.duration().seconds())
+                .in_manual_operation(!scenario.operation.is_automatic()),
             payload: None,
             missed: BTreeSet::new(),
             newest: Newest::new(period),
@@ -89,20 +76,18 @@ impl Judge {
             request: Request::default(),
             reports: Reports::default(),
             cut: None,
-            detected: None,
-            off: None,
-            beyond: [0; 3],
+            beyond: [0; 4],
             last: None,
-            moving: 0.0,
-            distance: 0.0,
-            driven: 0.0,
-            fastest: 0.0,
-            energy: 0.0,
-            lift: Lift::default(),
+            course: Course::default(),
             rest: None,
             ends: scenario.ends,
             mode: Mode::Boot,
             survived: false,
+            acted: Vec::new(),
+            stage: Stage::Off,
+            powered: None,
+            reported_at: None,
+            let_go: false,
             ended_switching_off: false,
         };
         judge.expect(&scenario.faults);
@@ -126,11 +111,12 @@ impl Judge {
     /// Whether the arm has not moved for as long as this.
     pub fn has_stood(&self, time: Duration) -> bool {
         self.last
-            .is_some_and(|last| last.t - self.moving > time.seconds())
+            .is_some_and(|last| last.t - self.course.moving > time.seconds())
     }
 
-    /// The scenario has ended, completed or not, and the arm has come to rest. What follows is to be still.
-    pub fn ended(&mut self, completed: bool) {
+    /// The scenario has ended, completed or not, and the arm has come to rest; which faults have acted by now. What follows is to be still.
+    pub fn ended(&mut self, completed: bool, acted: Vec<bool>) {
+        self.acted = acted;
         let told = self.reports.told();
         self.survived = match self.ends {
             Ending::Completed => completed && self.first().is_none(),
@@ -141,7 +127,7 @@ impl Judge {
         self.ended_switching_off = completed && matches!(self.cut, Some((_, Mode::Disabling)));
         self.rest = self.last;
         // Without feedback it may still be waiting for the brake.
-        if self.reports.latched().is_some() && !is_faulty(self.mode) {
+        if self.reports.latched().is_some() && !is_faulty(self.mode) && !self.has_forgotten() {
             self.miss(Requirement::Latch);
         }
         let onset = self.faults.onset().seconds();
@@ -154,7 +140,16 @@ impl Judge {
     /// The request to switch on that a latched fault has to refuse; `None` without one.
     pub fn temptation(&self) -> Option<CanFrame> {
         self.reports.latched()?;
-        self.request.enable()
+        // One that has forgotten it obeys, and does not break a promise by that.
+        self.request.enable().filter(|_| !self.has_forgotten())
+    }
+
+    /// Whether the controller has been without power since it told a fault: what it has latched is in its memory alone.
+    fn has_forgotten(&self) -> bool {
+        let now = self.last.map_or(Instant::ORIGIN, |last| at(last.t));
+        self.reports
+            .latched()
+            .is_some_and(|told| self.faults.forget(told, now))
     }
 
     /// The verdict.
@@ -165,28 +160,42 @@ impl Judge {
         self.judge_fall();
         let is_latched = self.reports.latched().is_some();
         let is_well = self.survived || self.ended_switching_off;
-        let was_off = self.reports.is_at_rest() || (self.first().is_none() && !self.is_powered());
-        self.missed
-            .extend(self.faults.judge_told(told, was_off, is_well));
+        let is_untold = self.first().is_none();
+        let was_off = self.reports.is_at_rest() || (is_untold && !self.is_powered());
+        // One that has not had torque since then has waited for its operator: what it was to tell is judged by its time.
+        let is_off = |[_, last]: [Instant; 2]| last < self.faults.onset();
+        let waits = is_untold && is_at_rest(self.mode) && self.powered.is_none_or(is_off);
         let end = self.last.map_or(0.0, |last| last.t);
+        let powered = self.powered.map(|[since, _]| since);
+        self.missed.extend(self.faults.judge_told(
+            told,
+            [was_off, is_well || waits],
+            powered,
+            at(end),
+        ));
         let may_be_on = self.faults.keep_torque_on(self.cut.is_some());
         if is_latched && !may_be_on && self.newest.enables_torque(end) {
             self.miss(Requirement::Standstill);
         }
-        let stopped = self.detected.is_some();
+        let stopped = self.course.is_stopped();
         let at = self.first().filter(|at| *at >= onset);
+        let never_began = self.faults.begin_after(self.rest);
         Verdict {
             survived: self.survived,
-            never_began: self.faults.begin_after(self.rest),
+            never_began,
+            never_acted: !never_began && has_begun && !self.acted.contains(&true),
+            unseen: self.faults.unseen(told, self.first(), &self.acted),
             detected: match told {
                 Some(cause) => Some(cause.name().into()),
                 None => self.cut.map(|_| "drives".into()),
             },
             detection_ms: at.and_then(since),
-            standstill_ms: stopped.then_some(self.moving.max(onset)).and_then(since),
-            distance_mm: stopped.then(|| round(self.distance * 1e3)),
-            energy_j: has_begun.then(|| round(self.energy)),
-            drop_mm: stopped.then(|| round(self.lift.drop() * 1e3)),
+            standstill_ms: stopped
+                .then_some(self.course.moving.max(onset))
+                .and_then(since),
+            distance_mm: stopped.then(|| round(self.course.distance * 1e3)),
+            energy_j: has_begun.then(|| round(self.course.energy)),
+            drop_mm: stopped.then(|| round(self.course.lift.drop() * 1e3)),
             missed: self.missed,
         }
     }
@@ -213,92 +222,38 @@ impl Judge {
         if !self.bounds.allows_torque(command) {
             self.miss(Requirement::Torque);
         }
-        let Some(before) = self.newest.take(time, command) else {
+        if !self.newest.take(time, command) {
             return;
+        }
+        // Where the drives do not count, the age of a command tells nothing, and its sample does.
+        let is_old = |newest: u32| newest.wrapping_sub(command.sample) < u32::MAX / 2;
+        let is_uncounted_one = self.faults.lose_count() && self.reported_at.is_some_and(is_old);
+        let is_sent_before = |reported: Instant| {
+            is_uncounted_one
+                || time.since(reported) <= self.period.duration() + self.faults.lateness()
         };
-        let normal = control.contains(ControlWord::TORQUE_ENABLE)
-            && control.contains(ControlWord::BRAKE_RELEASE)
-            && !control.contains(ControlWord::QUICK_STOP);
-        if let Some(reported) = self.reports.latched()
-            && normal
-            && time.since(reported) > self.period.duration() + self.faults.lateness()
-        {
+        if self.reports.latched().is_none_or(is_sent_before) {
+            return;
+        }
+        let enables = control.contains(ControlWord::TORQUE_ENABLE);
+        let releases = control.contains(ControlWord::BRAKE_RELEASE);
+        if enables && releases && !control.contains(ControlWord::QUICK_STOP) {
             self.miss(Requirement::Reaction);
         }
         // A fault that has switched torque off keeps it off.
-        if self.reports.latched().is_some()
-            && control.contains(ControlWord::TORQUE_ENABLE)
-            && !before.contains(ControlWord::TORQUE_ENABLE)
-        {
+        if enables && self.let_go && !self.has_forgotten() {
             self.miss(Requirement::Latch);
         }
+        self.let_go |= !enables;
     }
 
-    /// Everything that counts from the beginning of the fault on.
-    fn measure(&mut self, plant: &PlantState, reference: f64) {
-        let energy = self.bounds.energy(&plant.q, &plant.qd);
-        let is_driven = plant.tau != [0.0; 4];
-        if let Some(last) = &self.last {
-            let way = (0..3).map(|i| square(plant.tool[i] - last.tool[i]));
-            let way = way.sum::<f64>().sqrt();
-            self.distance += way;
-            if self.detected.is_some() && is_driven {
-                self.driven += way;
-            }
-            self.fastest = self.fastest.max(way / self.period.duration().seconds());
+    /// Follows what the arm is doing.
+    fn live(&mut self, now: Instant, is_powered: bool, is_driven: bool) {
+        self.stage = self.stage.after(now, self.mode, [is_powered, is_driven]);
+        if let Stage::Powered(since) = self.stage {
+            self.powered = Some([since, now]);
         }
-        self.energy = self.energy.max(energy);
-        if plant.is_moving() {
-            self.moving = plant.t + self.period.duration().seconds();
-        }
-        if self.bounds.is_too_fast(&plant.q, energy) {
-            self.miss(Requirement::Energy);
-        }
-        let elastic = self.bounds.elastic(&plant.q);
-        let mark = Mark {
-            time: plant.t,
-            lift: plant.q[2],
-            energy: energy + elastic,
-        };
-        if self.first().is_some() {
-            let detected = *self.detected.get_or_insert(mark);
-            self.lift.follow(plant, reference, is_driven);
-            self.judge_stop(detected, mark, is_driven, elastic > 0.0);
-        }
-    }
-
-    /// The way of the arm to standstill, once its fault has been detected.
-    fn judge_stop(&mut self, detected: Mark, now: Mark, is_driven: bool, on_stop: bool) {
-        if is_driven {
-            let was_off = self.off.take().is_some();
-            if self.reports.latched().is_none() {
-                // The drives had switched off, and nobody is told that they are on again.
-                if was_off {
-                    self.miss(Requirement::Latch);
-                }
-                return;
-            }
-            if now.time - detected.time > self.bounds.torque_off_s() {
-                if self.faults.leave_the_brake_open() {
-                    return;
-                }
-                self.miss(Requirement::Standstill);
-            }
-            if self.driven > self.fastest * self.bounds.stop_s() {
-                self.miss(Requirement::Distance);
-            }
-            return;
-        }
-        // Torque has been off for a whole sample at the next one.
-        let off = self.off.get_or_insert(now);
-        if on_stop || self.faults.catch_the_tool() {
-            // What an end stop, or what has caught the tool, gives back depends on the steps in which the plant takes the impact.
-            off.energy = now.energy;
-        }
-        let fallen = self.bounds.weight_work(off.lift, now.lift);
-        if now.energy > off.energy * 1.001 + fallen + ENERGY_TOLERANCE {
-            self.miss(Requirement::Energy);
-        }
+        self.faults.meet(self.stage);
     }
 
     fn judge_fall(&mut self) {
@@ -308,8 +263,14 @@ impl Judge {
         if !is_latched && (went_on || self.cut.is_none()) {
             return;
         }
-        let controlled = self.cut.is_none() && self.reports.ask_for_control();
-        if self.lift.is_too_low(&self.bounds, controlled, &self.faults) {
+        // One without power stops nothing.
+        let controlled =
+            self.cut.is_none() && !self.has_forgotten() && self.reports.ask_for_control();
+        if self
+            .course
+            .lift
+            .is_too_low(&self.bounds, controlled, &self.faults)
+        {
             self.miss(Requirement::Drop);
         }
     }
@@ -331,6 +292,10 @@ impl Observer for Judge {
             {
                 self.reports.take(time, cause);
             }
+            Message::State(state) if state.cause != Cause::None && self.faults.pile_up() => {
+                self.reports.repeat(time, state.cause);
+            }
+            Message::Heartbeat(node, _) => self.faults.hear(node),
             Message::Feedback(feedback) => {
                 let open = self.newest.brake_open(time, feedback.status);
                 if open > self.bounds.brake_told() && self.first().is_none() {
@@ -351,6 +316,12 @@ impl Observer for Judge {
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         let plant = &truth.plant;
         self.mode = truth.mind.mode;
+        if self.reports.latched().is_none()
+            && let Some(answered) = truth.mind.sample
+        {
+            // The next one is answered before it is looked at here.
+            self.reported_at = Some(answered.wrapping_add(1));
+        }
         self.reports.look(self.mode);
         let is_powered = self.is_powered();
         if is_powered && plant.tau == [0.0; 4] && self.last.is_some_and(|last| last.tau != [0.0; 4])
@@ -360,22 +331,43 @@ impl Observer for Judge {
         if is_powered
             && self.first().is_none()
             && truth.mind.knows_where()
+            // What the controller has not heard of it cannot report.
+            && truth.is_answered()
             && self.bounds.is_long_beyond(&mut self.beyond, truth)
         {
             self.miss(Requirement::Reported);
         }
-        let now = Instant::ORIGIN + Duration::from_seconds(plant.t);
-        if let Expected::DetectedBy(due) = self.faults.expected()
+        let now = at(plant.t);
+        self.live(now, is_powered, plant.tau != [0.0; 4]);
+        if self.first().is_none()
             && self.rest.is_none()
-            && now >= due
-            && is_powered
-            && self.first().is_none()
+            && self.faults.due().is_some_and(|due| now >= due)
         {
             self.miss(Requirement::Detected);
         }
-        self.lift.catch(plant, now >= self.faults.caught_from());
+        self.course
+            .lift
+            .catch(plant, now >= self.faults.caught_from());
+        // What has caught the tool may pull an arm without torque.
+        let is_pulled = plant.tau == [0.0; 4] && self.faults.catch_the_tool();
+        if !is_pulled && self.bounds.is_tool_too_fast(&plant.q, &plant.qd) {
+            self.miss(Requirement::Slow);
+        }
         if now >= self.faults.onset() && self.rest.is_none() {
-            self.measure(plant, truth.mind.q[2]);
+            let known = Known {
+                is_detected: self.first().is_some(),
+                is_latched: self.reports.latched().is_some(),
+            };
+            let samples = (self.last.as_ref(), plant);
+            let held_to = (&self.bounds, &self.faults);
+            self.course.measure(
+                samples,
+                truth.mind.q[2],
+                self.period,
+                known,
+                held_to,
+                &mut self.missed,
+            );
         }
         if let Some(rest) = &self.rest {
             let moved = (0..4).any(|i| (plant.q[i] - rest.q[i]).abs() > STANDING);
@@ -397,4 +389,9 @@ impl Observer for Judge {
     fn fault(&mut self, number: usize, from: Instant, until: Instant) {
         self.faults.retime(number, from, until);
     }
+}
+
+/// A time in s.
+fn at(seconds: f64) -> Instant {
+    Instant::ORIGIN + Duration::from_seconds(seconds)
 }

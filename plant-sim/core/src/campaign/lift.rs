@@ -93,7 +93,7 @@ impl Lift {
     /// its brake does not hold goes down without torque, and that says nothing about the controller.
     pub(super) fn is_too_low(&self, bounds: &Bounds, is_controlled: bool, faults: &Spells) -> bool {
         let allowed = bounds.drop(self.speed()) + self.pull();
-        if faults.open_the_brake() {
+        if faults.let_the_lift_fall() {
             return self.since.is_some_and(|since| since.driven > allowed);
         }
         self.drop() > allowed || (is_controlled && self.sunk() > STANDING)

@@ -36,21 +36,22 @@ impl Newest {
         }
     }
 
-    /// Takes a command; what the one before it switched. One that was overtaken or held up on its way does nothing any more.
-    pub(super) fn take(&mut self, time: Instant, command: &Command) -> Option<ControlWord> {
+    /// Takes a command, unless it was overtaken or held up on its way, and does nothing any more.
+    pub(super) fn take(&mut self, time: Instant, command: &Command) -> bool {
         let behind = |newest: u32| (1..RESTARTED).contains(&newest.wrapping_sub(command.sample));
         let is_overtaken = self.sample.is_some_and(behind);
         let answers = self.period.sample(command.sample.into());
         let is_late = self.counts && time.since(answers) > is_taken(self.period);
         if is_overtaken || is_late {
-            return None;
+            return false;
         }
         self.sample = Some(command.sample);
         self.time = time;
         if command.control.contains(ControlWord::BRAKE_RELEASE) {
             self.open = None;
         }
-        Some(std::mem::replace(&mut self.control, command.control))
+        self.control = command.control;
+        true
     }
 
     /// Whether the brake is to be open.

@@ -26,8 +26,30 @@ pub struct Tally {
     rows: BTreeMap<(String, String), Row>,
     /// Missed cases by kind of fault and requirement, and the first of them.
     misses: BTreeMap<(String, Requirement), (u64, u64)>,
-    /// The first case of which no fault began.
-    first_void: Option<u64>,
+    /// Cases of which no fault began, or none acted, and such of which one of several does not show.
+    never_began: Group,
+    never_acted: Group,
+    unseen: Group,
+}
+
+/// How many cases, and the first of them.
+#[derive(Clone, Copy, Debug, Default)]
+struct Group {
+    cases: u64,
+    first: u64,
+}
+
+impl Group {
+    fn add(&mut self, case: u64, counts: bool) {
+        if counts {
+            self.first = if self.cases == 0 {
+                case
+            } else {
+                self.first.min(case)
+            };
+            self.cases += 1;
+        }
+    }
 }
 
 /// Counts and worst cases of a kind of fault in a situation.
@@ -35,7 +57,6 @@ pub struct Tally {
 struct Row {
     cases: u64,
     missed: u64,
-    never_began: u64,
     survived: u64,
     detection_ms: Greatest,
     standstill_ms: Greatest,
@@ -78,7 +99,6 @@ impl Row {
     fn add(&mut self, verdict: &Verdict) {
         self.cases += 1;
         self.missed += u64::from(!verdict.missed.is_empty());
-        self.never_began += u64::from(is_void(verdict));
         self.survived += u64::from(verdict.survived);
         self.detection_ms.add(verdict.detection_ms);
         self.standstill_ms.add(verdict.standstill_ms);
@@ -99,12 +119,10 @@ impl Tally {
             *count += 1;
             *first = case.case.min(*first);
         }
-        if is_void(verdict) {
-            let first = self
-                .first_void
-                .map_or(case.case, |first| first.min(case.case));
-            self.first_void = Some(first);
-        }
+        let held = verdict.missed.is_empty();
+        self.never_began.add(case.case, held && verdict.never_began);
+        self.never_acted.add(case.case, held && verdict.never_acted);
+        self.unseen.add(case.case, !verdict.unseen.is_empty());
         self.all.add(verdict);
         let row = self.rows.entry((kinds, case.situation.clone()));
         row.or_default().add(verdict);
@@ -138,11 +156,6 @@ impl Tally {
     }
 }
 
-/// Whether a case shows nothing of its faults, nor of anything else.
-fn is_void(verdict: &Verdict) -> bool {
-    verdict.never_began && verdict.missed.is_empty()
-}
-
 /// The report, as Markdown.
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -165,13 +178,8 @@ impl fmt::Display for Tally {
                 row.drop_mm
             )?;
         }
-        let Row {
-            cases,
-            missed,
-            never_began,
-            ..
-        } = self.all;
-        let judged = cases - never_began;
+        let Row { cases, missed, .. } = self.all;
+        let judged = cases - self.never_began.cases - self.never_acted.cases;
         // A bound is not rounded down.
         let bound = (miss_rate_bound(judged, missed) * 1e5).ceil() / 1e3;
         writeln!(
@@ -180,11 +188,27 @@ impl fmt::Display for Tally {
              (Clopper-Pearson)",
             judged - missed
         )?;
-        if let Some(first) = self.first_void {
-            writeln!(
-                f,
-                "\n{never_began} of them are not counted: their runs ended before any of their faults began, the first of them case {first}"
-            )?;
+        for (some, what) in [
+            (
+                self.never_began,
+                "are not counted: their runs ended before any of their faults began",
+            ),
+            (
+                self.never_acted,
+                "are not counted: none of their faults had anything to act on, as nobody sent the message",
+            ),
+            (
+                self.unseen,
+                "do not show each of their faults: one had nothing to act on, or another had stopped the arm, or was told",
+            ),
+        ] {
+            if some.cases > 0 {
+                writeln!(
+                    f,
+                    "\n{} of them {what}, the first of them case {}",
+                    some.cases, some.first
+                )?;
+            }
         }
         if self.misses.is_empty() {
             return Ok(());

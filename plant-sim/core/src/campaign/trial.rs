@@ -26,8 +26,21 @@ pub fn run<'p, C: Peer + 'p, O: Observer>(
     connect: impl FnOnce(Config) -> Result<C, PeerError>,
     observer: &mut O,
 ) -> Result<(Verdict, Rig<'p>, Result<(), RunError>), Failure> {
+    run_before(Judge::new(config), config, connect, observer)
+}
+
+/// Like [`run`], before a judge who may be that of another run.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn run_before<'p, C: Peer + 'p, O: Observer>(
+    judge: Judge,
+    config: &RunConfig,
+    connect: impl FnOnce(Config) -> Result<C, PeerError>,
+    observer: &mut O,
+) -> Result<(Verdict, Rig<'p>, Result<(), RunError>), Failure> {
     let mut rig = assemble(config, connect)?;
-    let (verdict, result) = judged(&mut rig, Judge::new(config), observer)?;
+    let (verdict, result) = judged(&mut rig, judge, observer)?;
     Ok((verdict, rig, result))
 }
 
@@ -45,7 +58,7 @@ pub(super) fn judged<O: Observer>(
     while !observers.0.has_stood(WATCHED) && rig.now() < latest {
         watch(rig, &mut observers)?;
     }
-    observers.0.ended(result.is_ok());
+    observers.0.ended(result.is_ok(), rig.acted());
     watch(rig, &mut observers)?;
     if let Some(frame) = observers.0.temptation() {
         rig.inject(&frame);

@@ -17,7 +17,7 @@ pub enum Requirement {
     Detected,
     /// What is told is what broke, or what follows from it.
     Cause,
-    /// An axis off its reference, too fast or out of its range is reported at once.
+    /// An axis off its reference, too fast or out of its range, or in manual operation too fast a tool, is reported at once.
     Reported,
     /// The first command after the report stops the arm, at most one sample later.
     Reaction,
@@ -29,6 +29,8 @@ pub enum Requirement {
     Distance,
     /// Nothing drives the arm beyond its speed limits, or once torque is off.
     Energy,
+    /// In manual operation, no point of the tool gets faster than a fault can make it before the arm is stopped.
+    Slow,
     /// The lift goes down no further than it has to, and after a controlled stop not at all.
     Drop,
     /// A fault stays until it is acknowledged: nothing can be switched on.
@@ -50,6 +52,7 @@ impl Requirement {
             Self::Standstill => "standstill",
             Self::Distance => "distance",
             Self::Energy => "energy",
+            Self::Slow => "slow",
             Self::Drop => "drop",
             Self::Latch => "latch",
             Self::Still => "still",
@@ -67,6 +70,12 @@ pub struct Verdict {
     /// Whether none of its faults had begun when the run ended: it shows nothing of them, and counts neither as held nor as missed.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub never_began: bool,
+    /// Whether some had, and none of them had anything to act on, as where nobody sends the message: the same holds.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub never_acted: bool,
+    /// Those of several faults of which it shows nothing: they had nothing to act on, or another one was told, or had stopped the arm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unseen: Vec<String>,
     /// What stopped it: a cause that the controller reported, or `drives` where they switched off by themselves.
     pub detected: Option<String>,
     /// From the beginning of the fault until it was detected, ms; of a false alarm before it there is none.

@@ -111,6 +111,7 @@ impl<P: Peer> Faulty<P> {
                     && fault.acts(now)
                 {
                     self.busy = self.busy.max(now) + duration(seconds);
+                    fault.hit();
                 }
             }
         }
@@ -150,7 +151,8 @@ impl<P: Peer> Faulty<P> {
             if !fault.acts(time) {
                 continue;
             }
-            match kind {
+            let was_there = out.len() > first;
+            let hits = match kind {
                 FrameFault::Burst(share, length) => {
                     // The chain of Gilbert: a burst ends after `length` frames on average, and `share` of all are in one.
                     let ends = 1.0 / length;
@@ -163,42 +165,63 @@ impl<P: Peer> Faulty<P> {
                     if *in_burst {
                         out.truncate(first);
                     }
+                    *in_burst
                 }
                 FrameFault::Reorder(share) => {
-                    if self.random.rand_float() < share {
+                    let hits = self.random.rand_float() < share;
+                    if hits {
                         history.extend(out.drain(first..).map(|(_, frame)| frame));
                     }
+                    hits
                 }
                 FrameFault::Loss(share) => {
-                    if self.random.rand_float() < share {
+                    let hits = self.random.rand_float() < share;
+                    if hits {
                         out.truncate(first);
                     }
+                    hits
                 }
-                FrameFault::Delay(seconds) => delay(&mut out[first..], seconds),
+                FrameFault::Delay(seconds) => {
+                    delay(&mut out[first..], seconds);
+                    true
+                }
                 FrameFault::Jitter(seconds) => {
-                    delay(&mut out[first..], seconds * self.random.rand_float())
+                    delay(&mut out[first..], seconds * self.random.rand_float());
+                    true
                 }
-                FrameFault::Duplicate => out.extend_from_within(first..),
+                FrameFault::Duplicate => {
+                    out.extend_from_within(first..);
+                    true
+                }
                 FrameFault::Corrupt(share) => {
-                    if self.random.rand_float() < share {
+                    let hits = self.random.rand_float() < share;
+                    if hits {
                         for (_, frame) in &mut out[first..] {
                             flip(frame, &mut self.random);
                         }
                     }
+                    hits
                 }
                 FrameFault::BadValue(share) => {
-                    if self.random.rand_float() < share {
+                    let hits = self.random.rand_float() < share;
+                    if hits {
                         for (_, frame) in &mut out[first..] {
                             spoil(frame, info);
                         }
                     }
+                    hits
                 }
                 FrameFault::Replay(_) => {
                     if let Some(old) = old {
                         out.truncate(first);
                         out.push((time, old));
                     }
+                    old.is_some()
                 }
+            };
+            // What another fault has taken already is not hit.
+            if hits && was_there {
+                fault.hit();
             }
         }
     }

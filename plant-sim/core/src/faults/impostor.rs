@@ -100,7 +100,10 @@ impl Peer for Impostor {
             Some(_) => {}
             None => {
                 self.next = now + self.period.duration();
-                out.extend(self.frame().map(|frame| (now, frame)));
+                if let Some(frame) = self.frame() {
+                    self.fault.hit();
+                    out.push((now, frame));
+                }
             }
         }
         Ok(())

@@ -25,6 +25,8 @@ pub struct Planned {
     /// What breaks, and how.
     pub what: What,
     window: Rc<Cell<(Instant, Instant)>>,
+    /// Whether it has changed a frame, or what becomes of one.
+    has_hit: Rc<Cell<bool>>,
 }
 
 impl Planned {
@@ -32,6 +34,21 @@ impl Planned {
     pub fn acts(&self, now: Instant) -> bool {
         let (from, until) = self.window.get();
         from <= now && now < until
+    }
+
+    /// Whether it is the same fault of the run.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        Rc::ptr_eq(&self.window, &other.window)
+    }
+
+    /// It has changed a frame, or what becomes of one.
+    pub(crate) fn hit(&self) {
+        self.has_hit.set(true);
+    }
+
+    /// Whether it has.
+    pub(crate) fn has_hit(&self) -> bool {
+        self.has_hit.get()
     }
 
     /// Present or next window; one that does not come, or is not known yet, is at the end of time.
@@ -59,6 +76,7 @@ impl Watch {
             fault: Planned {
                 what: fault.what,
                 window: Rc::new(Cell::new(window.unwrap_or((Instant::MAX, Instant::MAX)))),
+                has_hit: Rc::default(),
             },
             window: fault.window,
             period,

@@ -10,7 +10,7 @@ use nalgebra::{Matrix4, Vector4};
 ///
 /// No square roots and no test of the pivots: kinetic energy is positive for every motion of links that have mass and
 /// inertia, which the model guarantees.
-pub(super) struct Factor {
+pub(crate) struct Factor {
     /// L below its diagonal of ones: the wrist by the lift, the elbow by the shoulder, the wrist by both.
     by_lift: f64,
     elbow_by_shoulder: f64,
@@ -22,7 +22,7 @@ pub(super) struct Factor {
 
 impl Factor {
     /// Factors `matrix`, of which the lower half is read.
-    pub(super) fn of(matrix: &Matrix4<f64>) -> Self {
+    pub(crate) fn of(matrix: &Matrix4<f64>) -> Self {
         let m = |i, j| matrix[(i, j)];
         let (lift, shoulder) = (1.0 / m(2, 2), 1.0 / m(0, 0));
         let by_lift = m(3, 2) * lift;
@@ -42,7 +42,7 @@ impl Factor {
     }
 
     /// The solution of `matrix x = right`.
-    pub(super) fn solve(&self, right: &Vector4<f64>) -> Vector4<f64> {
+    pub(crate) fn solve(&self, right: &Vector4<f64>) -> Vector4<f64> {
         let mut x = *right;
         x[1] -= self.elbow_by_shoulder * x[0];
         x[3] -= self.by_lift * x[2] + self.by_shoulder * x[0] + self.by_elbow * x[1];

@@ -5,7 +5,7 @@ use protocol::time::Instant;
 
 use super::Rig;
 use crate::bus::Wrong;
-use crate::faults::{Fault, Planned, Sense, Watch};
+use crate::faults::{Fault, Planned, Sense, Watch, What};
 use crate::observer::Observer;
 use crate::world::CellEvent;
 
@@ -17,7 +17,8 @@ const LIFT: usize = 2;
 pub(super) struct Schedule {
     /// Each with its number among all faults.
     watches: Vec<(usize, Watch)>,
-    planned: usize,
+    /// All of them.
+    planned: Vec<Planned>,
     sense: Sense,
     /// What is wrong with the bus, by fault.
     wrong: Vec<(Planned, Wrong)>,
@@ -47,10 +48,26 @@ impl Rig<'_> {
         let planned = watch.fault.clone();
         let schedule = &mut self.faults;
         if watch.waits() {
-            schedule.watches.push((schedule.planned, watch));
+            schedule.watches.push((schedule.planned.len(), watch));
         }
-        schedule.planned += 1;
+        schedule.planned.push(planned.clone());
         planned
+    }
+
+    /// Whether each fault has acted up to now: those of frames where there was one to act on, all others since their windows opened.
+    pub fn acted(&self) -> Vec<bool> {
+        let Schedule { planned, wrong, .. } = &self.faults;
+        let has_acted = |fault: &Planned| match fault.what {
+            What::Frames(..) | What::Foreign(..) | What::Slow(_) => fault.has_hit(),
+            What::Attempts(..) | What::Misreads(..) => {
+                let of_this = wrong.iter().filter(|(other, _)| other.is(fault));
+                of_this
+                    .map(|(_, wrong)| *wrong)
+                    .any(|wrong| self.bus.has_hit(wrong))
+            }
+            _ => fault.window().0 < self.now(),
+        };
+        planned.iter().map(has_acted).collect()
     }
 
     /// Opens and closes the windows of faults at a sample.
