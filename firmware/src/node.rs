@@ -36,8 +36,6 @@ const FARTHEST: u32 = 10 * PEER_TIMEOUT_MS;
 /// Planning pauses every tenth sample, for what need not be looked at more often, and so that no report waits longer: half the
 /// period of the state at 1 kHz, for a tenth of the planning. Counted in samples and not in time, so that the same feedback gives the same torques.
 const REPORT_SAMPLES: u32 = 10;
-/// Of these the one in which axes that stand are watched, far from the one that has other work.
-const STANCE_SAMPLE: u32 = 5;
 /// Answers that may wait for such a sample; with more, reports are sent in spite of planning. Two leave room in the
 /// outbox for a request in every sample until then.
 const MAX_ANSWERS_WAITING: usize = 2;
@@ -314,8 +312,7 @@ impl Node {
             self.controller.tend(REPORT_SAMPLES);
             false
         } else {
-            let is_turn = self.samples % REPORT_SAMPLES == STANCE_SAMPLE;
-            self.controller.plan_or_watch(&readings, is_turn)
+            self.controller.plan_or_watch(&readings, self.samples)
         };
         probe.end(Phase::Planning);
         planned

@@ -180,7 +180,7 @@ fn example(kind: &Kind) -> String {
     let window = match kind.place {
         // While the brake is closed and is to open.
         "brake" => "0s..80ms",
-        _ => "400ms..408ms",
+        _ => "320ms..328ms",
     };
     format!("{place}{axis}:{}{value}@{window}", kind.name)
 }
@@ -238,7 +238,7 @@ fn every_kind_of_fault_acts_on_an_external_controller() {
         let text = example(&kind);
         // Without a bus-off there is nothing to recover from.
         let faults = match kind.name {
-            "no-recovery" => vec![text.as_str(), "command:bit-error@400ms..405ms"],
+            "no-recovery" => vec![text.as_str(), "command:bit-error@320ms..325ms"],
             _ => vec![text.as_str()],
         };
         let external = there(&faults);

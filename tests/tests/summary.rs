@@ -44,7 +44,7 @@ struct Effort {
 impl Observer for Effort {
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         for axis in 0..4 {
-            let at_limit = truth.plant.tau[axis].abs() > 0.999 * self.limit[axis];
+            let at_limit = truth.plant.tau[axis].abs() > 0.999_99 * self.limit[axis];
             self.now[axis] = if at_limit { self.now[axis] + 1 } else { 0 };
             self.longest[axis] = self.longest[axis].max(self.now[axis]);
         }

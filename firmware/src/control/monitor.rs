@@ -278,9 +278,8 @@ impl Monitor {
         };
         let went_back = Axis::ALL.map(is_back);
         let mut suspects = went_back;
-        if let Some(felt) = suspects.get_mut(axis as usize) {
-            *felt = true;
-        }
+        let felt = suspects.get_mut(axis as usize);
+        felt.into_iter().for_each(|felt| *felt = true);
         let stands = Axis::ALL.map(|it| is_still(it) && (it == axis || was_to_move(it)));
         // Away from its reference, and not ahead of it on the same way.
         let is_away = (axis.of(qd) - axis.of(now)).abs() > 0.5 * axis.of(qd).abs();
@@ -327,16 +326,13 @@ impl Monitor {
     /// An encoder that jumps further in these samples than its axis can move.
     pub fn jumped(&self, moved: &Vector4<f32>, samples: f32) -> Option<Fault> {
         let jump = self.jump * samples;
-        let axis = most_beyond(moved, &jump)?;
-        Some(of_axis(Cause::EncoderFault, axis, moved, &jump))
+        most_beyond(moved, &jump).map(|axis| of_axis(Cause::EncoderFault, axis, moved, &jump))
     }
 
     /// Forgets the counts, for a new start.
     pub fn reset(&mut self) {
-        self.collision_count = 0;
-        self.following_count = 0;
-        self.speed_count = 0;
-        self.range_count = 0;
+        (self.collision_count, self.following_count) = (0, 0);
+        (self.speed_count, self.range_count) = (0, 0);
     }
 }
 

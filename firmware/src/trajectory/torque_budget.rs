@@ -16,7 +16,7 @@ use crate::mechanics::math::{cbrt, clamp, least};
 const RATE_SHARE: f32 = 0.95;
 
 /// The same for the mean over a step of the last pass; above it, so that this pass does not slow down what just keeps it.
-const VERIFIED_RATE: f32 = 0.954;
+const VERIFIED_RATE: f32 = 0.952;
 /// Share of the torque's rate of change that a stop may use: the move's own change keeps the rest.
 pub(super) const STOP_SHARE: f32 = 0.5;
 /// The same for another pace, which nobody needs at once: what a plan leaves.

@@ -204,9 +204,7 @@ fn raise(cause: Cause) -> Option<(Bench, Vec<Message>)> {
             bench.run(2)
         }
         Cause::StuckSensor => {
-            // As for the torque, of which the motor has all that it may have for ever, and the encoder stands.
-            bench.position[2] += (0.009 / 0.025 * 131_072.0) as i32;
-            bench.torque[2] = -1000;
+            bench.strain();
             bench.run(3)
         }
         Cause::OverSpeed => {
@@ -344,8 +342,7 @@ fn an_encoder_that_stands_while_its_motor_gives_everything_is_stuck() {
             let mut bench = Bench::with(Config::new(IRB_930, Period::of_rate(rate)));
             bench.enable();
             bench.run(100);
-            bench.position[2] += (0.009 / 0.025 * 131_072.0) as i32;
-            bench.torque[2] = -1000;
+            bench.strain();
             bench.velocity[2] = velocity;
             bench.run(samples - 1);
             assert_eq!(bench.mode(), Mode::Enabled, "{rate} Hz");

@@ -26,6 +26,9 @@ const TURNING: f32 = 100.0;
 /// Share of its greatest speed below which an axis hardly moves. It passes that within milliseconds when it turns back.
 const SLOW: f32 = 0.1;
 
+/// Samples of which one has a look at axes that stand.
+const STANCE_SAMPLES: u32 = 10;
+
 /// A torque that swings from limit to limit, %, as [`Chatter`](crate::control::chatter::Chatter) counts it.
 const FULL_SWING: f32 = 400.0;
 
@@ -142,11 +145,13 @@ impl Controller {
         }
     }
 
-    /// Plans, or watches axes that stand where there is nothing to plan: in one sample of some, whose turn it is; in manual operation, where a moment
-    /// counts, in each, and then rather than planning where it is its turn. Returns whether there was anything to plan.
-    pub fn plan_or_watch(&mut self, readings: &Readings, is_turn: bool) -> bool {
+    /// Plans, or watches axes that stand where there is nothing to plan: in one of ten samples; in manual operation, where a moment counts, in each,
+    /// and while the arm moves in every other one rather than planning. `samples` numbers them. Returns whether there was anything to plan.
+    pub fn plan_or_watch(&mut self, readings: &Readings, samples: u32) -> bool {
         let is_manual = self.operation == Operation::Manual;
-        let planned = !(is_manual && is_turn) && self.plan();
+        let is_turn = samples % if is_manual { 2 } else { STANCE_SAMPLES } == 1;
+        let is_first = is_manual && is_turn && self.state == State::Moving;
+        let planned = !is_first && self.plan();
         if !planned && (is_manual || is_turn) {
             self.watch_stance(readings);
         }

@@ -150,6 +150,7 @@ pub(super) fn of(what: What) -> Option<&'static [Cause]> {
             Cause::DriveFault,
             Cause::Collision,
             Cause::EncoderFault,
+            Cause::StuckSensor,
             Cause::Chatter,
             Cause::OverSpeed,
         ],
