@@ -209,15 +209,9 @@ const OUT_OF_REACH: [(Cause, &str); 2] = [
     ),
 ];
 
-/// What docs/campaign.md lists as missed: an encoder that gets stuck or slow while its axis stands or hardly moves. No row is judged by such a
-/// case.
+/// What docs/campaign.md lists as missed: an encoder that is late in manual operation. No row is judged by such a case.
 fn is_known(case: &Case, verdict: &Verdict) -> bool {
-    let lags = |fault: &Fault| {
-        matches!(
-            fault.what,
-            What::Encoder(_, EncoderDefect::Stuck | EncoderDefect::Slow(_))
-        )
-    };
+    let lags = |fault: &Fault| matches!(fault.what, What::Encoder(_, EncoderDefect::Slow(_)));
     case.faults.iter().all(lags) && verdict.missed.iter().eq([&Requirement::Reported])
 }
 
