@@ -7,7 +7,7 @@ use protocol::messages::{Refusal, RefusalReason};
 use super::clock::Clock;
 use super::path::Path;
 use super::planner::Planner;
-use super::request::Request;
+use super::request::{Answer, Request};
 use super::torque_budget::{RAMP_SHARE, STOP_SHARE, TorqueBudget};
 use super::{Rates, Reference, Setpoint, Trajectory};
 use crate::mechanics::math::sqrt;
@@ -21,7 +21,6 @@ const LEAST_PACE: f32 = 0.5;
 /// Share of the torque that moves are slowed down to.
 const EASED: f32 = 0.97;
 
-type Answer = (u8, Result<(), Refusal>);
 /// Result of [`MoveQueue::advance`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {

@@ -32,6 +32,9 @@ pub enum Target {
     },
 }
 
+/// The number of a request, and whether it was accepted.
+pub type Answer = (u8, Result<(), Refusal>);
+
 /// A move to plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
