@@ -11,6 +11,8 @@
 
 #[path = "common/record.rs"]
 mod record;
+#[path = "common/tool.rs"]
+mod tool;
 
 use std::fmt::Write;
 
@@ -18,15 +20,13 @@ use oorandom::Rand64;
 use protocol::codec;
 use protocol::messages::{Cause, Law, Message, Mode, MotionRequest, Operation};
 use record::{Record, run_of};
-use sim::observer::PlantState;
-use sim::plant::kinematics::wrap;
 use sim::run::in_process;
 use sim::scenario::{OperationName, PayloadSpec, Scenario};
 use sim::setup::RunConfig;
+use tool::speed;
 
-/// m/s of ISO 10218-1, at every point within so many m of the axis of the flange.
+/// m/s of ISO 10218-1, at every point of the tool.
 const LIMIT: f64 = 0.25;
-const REACH: f64 = 0.1;
 
 /// A scenario of manual operation at this rate, with this payload in kg and these steps.
 fn scenario(rate: u32, payload: f64, steps: &str) -> Scenario {
@@ -42,13 +42,6 @@ fn scenario(rate: u32, payload: f64, steps: &str) -> Scenario {
         }
     );
     Scenario::parse(&text, "a test").unwrap()
-}
-
-/// The speed of the fastest point of the tool between two samples, m/s, by where it truly was.
-fn speed(a: &PlantState, b: &PlantState) -> f64 {
-    let [x, y, z] = [0, 1, 2].map(|i| b.tool[i] - a.tool[i]);
-    let turn = wrap(b.tool[3] - a.tool[3]).abs();
-    (x.hypot(y) + REACH * turn).hypot(z) / (b.t - a.t)
 }
 
 /// Times of the holds, s.

@@ -10,19 +10,22 @@
 
 #[path = "common/record.rs"]
 mod record;
+#[path = "common/tool.rs"]
+mod tool;
 
 use record::{Record, run_of};
 use sim::scenario::{OperationName, Scenario, built_in};
 use sim::summary::Summary;
+use tool::speed;
 
 const AXES: [&str; 4] = ["shoulder", "elbow", "lift", "wrist"];
 /// How far an axis gets at the most from where it stood until it has come to rest again: rad, rad, m, rad. It is found by its effort, which a slow loop
 /// builds up slowly.
 const STRAYS: [f64; 4] = [0.2, 0.2, 0.1, 0.01];
 const SLOW_STRAYS: [f64; 4] = [0.6, 0.2, 0.1, 0.01];
-/// Speed of the flange in manual operation, m/s: that of the plan and what an axis gains until it is found, or its reading has turned round.
+/// Speed of the tool in manual operation, m/s: that of the plan and what an axis gains until it is found, or its reading has turned round.
 const STUCK_SPEED: f64 = 0.4;
-const FASTEST: f64 = 1.5;
+const FASTEST: f64 = 2.1;
 
 fn stands(cycle: &str, rate: f64, law: &str, mass: f64) -> Scenario {
     let changes = [cycle, "requirements=[]", "cycles=1"].map(|change| change.parse().unwrap());
@@ -47,14 +50,10 @@ fn strays(record: &Record, axis: usize, begin: f64) -> f64 {
     far.fold(0.0, f64::max)
 }
 
-/// Greatest speed of the flange, m/s.
+/// Greatest speed of the tool, m/s.
 fn fastest(record: &Record) -> f64 {
     let pairs = record.truths.windows(2);
-    let speeds = pairs.map(|pair| {
-        let (a, b) = (&pair[0].plant, &pair[1].plant);
-        let [x, y, z] = [0, 1, 2].map(|i| b.tool[i] - a.tool[i]);
-        x.hypot(y).hypot(z) / (b.t - a.t)
-    });
+    let speeds = pairs.map(|pair| speed(&pair[0].plant, &pair[1].plant));
     speeds.fold(0.0, f64::max)
 }
 
