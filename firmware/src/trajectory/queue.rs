@@ -223,7 +223,7 @@ impl MoveQueue {
         self.is_busy() || !(self.requests.is_empty() || self.moves.is_full())
     }
 
-    /// A step of planning, and more as long as all of them [take](Planner::cost) at most `room` instructions. Returns an answer once there is one.
+    /// A step of planning, and more as long as all of them take at most `room` instructions. Returns an answer once there is one.
     pub fn plan(&mut self, budget: &TorqueBudget<'_>, room: u16) -> Option<Answer> {
         let mut taken = 0_u16;
         loop {
