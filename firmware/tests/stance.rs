@@ -36,7 +36,7 @@ fn of(axis: Axis, value: f32) -> Vector4<f32> {
 }
 
 /// What a watch finds that looks at an axis with these efforts in turn, at the count and the motor velocity that go with them.
-fn found(axis: Axis, looks: &[(f32, i32, f32)]) -> Option<(usize, Axis, f32, f32)> {
+fn found_by(close: bool, axis: Axis, looks: &[(f32, i32, f32)]) -> Option<(usize, Axis, f32, f32)> {
     let mut stance = Stance::new();
     looks.iter().enumerate().find_map(|(number, look)| {
         let (effort, count, velocity) = *look;
@@ -44,9 +44,13 @@ fn found(axis: Axis, looks: &[(f32, i32, f32)]) -> Option<(usize, Axis, f32, f32
         counts[axis as usize] = count;
         velocities[axis as usize] = velocity;
         let readings = readings(counts, velocities);
-        let found = stance.look(&readings, &of(axis, effort), &FRICTION, &COUNT)?;
+        let found = stance.look(&readings, &of(axis, effort), &FRICTION, &COUNT, close)?;
         Some((number, found.0, found.1, found.2))
     })
+}
+
+fn found(axis: Axis, looks: &[(f32, i32, f32)]) -> Option<(usize, Axis, f32, f32)> {
+    found_by(false, axis, looks)
 }
 
 #[test]
@@ -107,7 +111,29 @@ fn a_sound_axis_is_not_found() {
             ),
         ];
         for (what, looks) in sound {
-            assert_eq!(found(axis, &looks), None, "{axis:?} {what}");
+            for close in [false, true] {
+                assert_eq!(found_by(close, axis, &looks), None, "{axis:?} {what}");
+            }
+        }
+    }
+}
+
+/// The effort jumps with the motion that is not shown any more: seen against that of the motion where the looks are close.
+#[test]
+fn an_axis_whose_encoder_gets_stuck_in_motion_is_found_at_the_second_look() {
+    for axis in Axis::ALL {
+        let bound = axis.of(&BOUND);
+        for load in [0.0, 32.0] {
+            let jump = load + bound * 1.5;
+            let looks = [
+                (load, 3, 0.5),
+                (load, 5, 0.5),
+                (jump, 6, 0.0),
+                (jump, 6, 0.0),
+            ];
+            let growth = bound * 1.5;
+            assert_eq!(found_by(true, axis, &looks), Some((3, axis, growth, bound)));
+            assert_eq!(found_by(false, axis, &looks), None);
         }
     }
 }
@@ -121,7 +147,13 @@ fn the_axis_that_stands_is_named_though_others_move() {
             let mut counts = [look; 4];
             counts[axis as usize] = 0;
             let effort = BOUND * look as f32;
-            stance.look(&readings(counts, [0.0; 4]), &effort, &FRICTION, &COUNT)
+            stance.look(
+                &readings(counts, [0.0; 4]),
+                &effort,
+                &FRICTION,
+                &COUNT,
+                false,
+            )
         });
         assert_eq!(named.map(|it| it.0), Some(axis));
     }

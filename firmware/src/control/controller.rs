@@ -18,8 +18,8 @@ mod transitions;
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
-    Cause, Compensation, ControlWord, Fault, Law, LimitFlags, MotionReply, MotionRequest,
-    Operation, Outcome, Refusal,
+    Cause, Compensation, ControlWord, Fault, LimitFlags, MotionReply, MotionRequest, Operation,
+    Outcome, Refusal,
 };
 use protocol::parameters::ControllerParameter as Parameter;
 use protocol::time::Period;
@@ -29,7 +29,7 @@ use crate::control::burden::Burden;
 use crate::control::chatter::Chatter;
 use crate::control::heat::Heat;
 use crate::control::laws::observer::MomentumObserver;
-use crate::control::laws::{ControlInput, Memory, Motion, Selection};
+use crate::control::laws::{ControlInput, Memory, Motion};
 use crate::control::limits;
 use crate::control::monitor::{Felt, Monitor};
 use crate::control::phase::{Phase, Probe};
@@ -270,14 +270,10 @@ impl Controller {
             excess: &self.excess,
         };
         let mut selection = &self.setup.selection;
-        let axis_by_axis;
-        if self.limp {
-            // What the arm's encoders show must not reach the shaft.
-            axis_by_axis = Selection {
-                law: Law::PdGravity,
-                ..*selection
-            };
-            selection = &axis_by_axis;
+        let lowered;
+        if self.limp || self.operation == Operation::Manual {
+            lowered = self.lowered();
+            selection = &lowered;
         }
         let input = ControlInput {
             motion: &motion,

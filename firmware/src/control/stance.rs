@@ -28,6 +28,8 @@ struct Place {
     count: i32,
     /// Magnitude of the effort then, N m, lift N.
     effort: f32,
+    /// The same when it was last looked at twice, the older first: between the two an encoder may have got stuck in the middle of a sample.
+    last: [f32; 2],
 }
 
 impl Stance {
@@ -36,6 +38,7 @@ impl Stance {
         let nowhere = Place {
             count: i32::MAX,
             effort: 0.0,
+            last: [f32::INFINITY; 2],
         };
         Self {
             places: [nowhere; 4],
@@ -43,19 +46,21 @@ impl Stance {
     }
 
     /// Judges the efforts that the model does not explain (N m, lift N), with the dry friction of each axis and what the loop makes of a
-    /// count. Returns the first axis whose effort has grown by more than these hold, with that growth and its bound.
+    /// count. Looks are `close` where an axis that came to rest between two of them hardly slowed down before the first: an effort that has
+    /// grown since then is that of the motion which an encoder misses that got stuck. Returns the first axis whose effort has grown by more than these hold, with that growth and its bound.
     pub fn look(
         &mut self,
         readings: &Readings,
         effort: &Vector4<f32>,
         friction: &Vector4<f32>,
         spring: &Vector4<f32>,
+        close: bool,
     ) -> Option<(Axis, f32, f32)> {
         let bound = friction * BEYOND + spring * COUNTS;
         let mut growths = [0.0; 4];
         let axes = Axis::ALL.into_iter().zip(self.places.iter_mut());
         for ((axis, place), growth) in axes.zip(growths.iter_mut()) {
-            *growth = place.growth(axis, readings, effort);
+            *growth = place.growth(axis, readings, effort, close);
         }
         let growth = Vector4::from(growths);
         let axis = first_beyond(&growth, &bound)?;
@@ -67,11 +72,27 @@ impl Place {
     /// How much more the effort of an axis is than when it was first found here, if it is; 0 if it moves, and is somewhere else from now on.
     // Out of line, for the size of four copies.
     #[inline(never)]
-    fn growth(&mut self, axis: Axis, readings: &Readings, effort: &Vector4<f32>) -> f32 {
+    fn growth(
+        &mut self,
+        axis: Axis,
+        readings: &Readings,
+        effort: &Vector4<f32>,
+        close: bool,
+    ) -> f32 {
         let count = readings.counts.get(axis as usize).copied();
         let effort = axis.of(effort).abs();
-        if count != Some(self.count) || axis.of(&readings.velocity) != 0.0 {
-            (self.count, self.effort) = (count.unwrap_or_default(), effort);
+        let [older, newer] = self.last;
+        self.last = [newer, effort];
+        let moves = axis.of(&readings.velocity) != 0.0;
+        if moves || count != Some(self.count) {
+            let has_stopped = close && !moves;
+            self.effort = if has_stopped {
+                older.min(newer).min(effort)
+            } else {
+                effort
+            };
+            self.count = count.unwrap_or_default();
+            return 0.0;
         }
         // Less than 0 after a load was lost.
         (effort - self.effort).max(0.0)

@@ -24,8 +24,10 @@ const AXES: [&str; 4] = ["shoulder", "elbow", "lift", "wrist"];
 const STRAYS: [f64; 4] = [0.2, 0.2, 0.1, 0.01];
 const SLOW_STRAYS: [f64; 4] = [0.6, 0.2, 0.1, 0.01];
 /// Speed of the tool in manual operation, m/s: that of the plan and what an axis gains until it is found, or its reading has turned round.
-const STUCK_SPEED: f64 = 0.4;
-const FASTEST: f64 = 2.1;
+const STUCK_SPEED: f64 = 0.35;
+const LATE_SPEED: f64 = 0.65;
+/// Of one that is reversed, by the rate in Hz.
+const REVERSED_SPEED: [(f64, f64); 3] = [(500.0, 1.2), (1000.0, 0.8), (2000.0, 0.8)];
 
 fn stands(cycle: &str, rate: f64, law: &str, mass: f64) -> Scenario {
     let changes = [cycle, "requirements=[]", "cycles=1"].map(|change| change.parse().unwrap());
@@ -93,24 +95,35 @@ fn an_encoder_that_gets_stuck_while_its_axis_stands_is_told() {
 #[test]
 fn an_encoder_that_fails_in_manual_operation_makes_the_tool_little_faster() {
     let cycle = "cycle=[{jump={to=[0.35,0.35,-0.3,2.0],top=-0.2}},{jump={to=[0.6,-0.2,-0.3,-1.0],top=-0.3}}]";
-    for rate in [500.0, 1000.0, 2000.0] {
-        for mass in [0.0, 2.0, 22.0] {
-            for axis in AXES {
-                for defect in ["stuck", "slow=0.02", "reversed"] {
-                    for at in [0.4, 0.7, 1.0, 1.5] {
-                        let law = "computed-torque:observer";
-                        let mut scenario = stands(cycle, rate, law, mass);
-                        scenario.operation = OperationName::Manual;
-                        let fault = format!("encoder:{axis}:{defect}@{at}s");
-                        let (summary, record) = run_of(scenario, &[&fault], 3);
-                        let what = format!("{fault} at {rate} Hz, {mass} kg");
-                        let (cause, named) = told(&summary).unwrap_or_else(|| panic!("{what}"));
-                        let fastest = fastest(&record);
-                        if defect == "stuck" {
-                            assert_eq!((cause, named), ("stuck-sensor", Some(axis)), "{what}");
-                            assert!(fastest < STUCK_SPEED, "{what}: {fastest}");
+    for (rate, reversed) in REVERSED_SPEED {
+        let defects = [
+            ("stuck", STUCK_SPEED),
+            ("slow=0.005", LATE_SPEED),
+            ("slow=0.02", LATE_SPEED),
+            ("slow=0.05", LATE_SPEED),
+            ("reversed", reversed),
+        ];
+        for (mass, axis) in [0.0, 2.0, 22.0]
+            .into_iter()
+            .flat_map(|mass| AXES.map(|axis| (mass, axis)))
+        {
+            for (defect, allowed) in defects {
+                for at in [0.4, 0.7, 1.0, 1.5] {
+                    let law = "computed-torque:observer";
+                    let mut scenario = stands(cycle, rate, law, mass);
+                    scenario.operation = OperationName::Manual;
+                    let fault = format!("encoder:{axis}:{defect}@{at}s");
+                    let (summary, record) = run_of(scenario, &[&fault], 3);
+                    let what = format!("{fault} at {rate} Hz, {mass} kg");
+                    let fastest = fastest(&record);
+                    assert!(fastest < allowed, "{what}: {fastest}");
+                    // One that is late may do no harm.
+                    match (defect, told(&summary)) {
+                        ("stuck", told) => {
+                            assert_eq!(told, Some(("stuck-sensor", Some(axis))), "{what}")
                         }
-                        assert!(fastest < FASTEST, "{what}: {fastest}");
+                        ("reversed", told) => assert_ne!(told, None, "{what}"),
+                        _ => {}
                     }
                 }
             }

@@ -1,10 +1,11 @@
 //! Manual operation: moves go on only while they are held, and slowly (ISO 10218-1).
 
 use nalgebra::Vector4;
-use protocol::messages::{Cause, Fault, FaultAxis, Operation, Refusal, RefusalReason};
+use protocol::messages::{Cause, Fault, FaultAxis, Law, Operation, Refusal, RefusalReason};
 
 use super::Controller;
 use super::requests::Answer;
+use crate::control::laws::Selection;
 use crate::control::states::State;
 use crate::mechanics::jacobian::Jacobian;
 use crate::mechanics::kinematics::Trig;
@@ -63,6 +64,21 @@ impl Controller {
     pub(super) fn let_go(&mut self) {
         self.loosen(u32::MAX);
         self.too_fast = 0;
+    }
+
+    /// The law where it is not used as it was chosen.
+    // Out of line: not in automatic operation.
+    #[inline(never)]
+    pub(super) fn lowered(&self) -> Selection {
+        let mut selection = self.setup.selection;
+        if self.operation == Operation::Manual {
+            selection.gains = selection.gains.in_manual();
+        }
+        if self.limp {
+            // What the arm's encoders show must not reach the shaft.
+            selection.law = Law::PdGravity;
+        }
+        selection
     }
 
     /// Judges the velocity of the flange, measured.

@@ -166,12 +166,13 @@ impl Controller {
             return;
         }
         let drive = &self.body.drive;
-        let gains = &self.setup.selection.gains;
+        let gains = &self.lowered().gains;
         let corner = gains.observer.max(self.least_corner);
         let stiffness = self.body.nominal_inertia * (gains.proportional() + corner / self.period);
         let count = stiffness.component_mul(&drive.own_count());
         let effort = self.observer.residual();
-        let found = (self.stance).look(readings, effort, drive.coulomb(), &count);
+        let close = self.operation == Operation::Manual;
+        let found = (self.stance).look(readings, effort, drive.coulomb(), &count, close);
         if let Some((axis, growth, bound)) = found {
             self.blame(axis, Cause::StuckSensor, growth, bound);
         }

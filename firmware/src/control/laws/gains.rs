@@ -52,6 +52,10 @@ impl Gains {
     /// of each limit, and a step is half above the mean and half below.
     pub const ENCODER_STEP: f32 = 0.1;
 
+    /// Greatest bandwidth in manual operation, rad/s: the loop is stable with a reading that is 10 ms late, and diverges slowly with
+    /// one of which that cannot be said. What moves slowly needs no more.
+    pub const MANUAL: f32 = 25.0;
+
     /// Defaults of the parameter table, for an arm as stiff as the model says, reduced where the delay of sampling
     /// every `period` seconds requires it.
     pub fn for_period(period: f32) -> Self {
@@ -132,6 +136,16 @@ impl Gains {
             return Err(out_of_range(self.observer, greatest));
         }
         Ok(())
+    }
+
+    /// The same as used in manual operation.
+    pub fn in_manual(self) -> Self {
+        let bandwidth = self.bandwidth.min(Self::MANUAL);
+        Self {
+            bandwidth,
+            observer: self.observer.min(self.damping * bandwidth),
+            ..self
+        }
     }
 
     /// Kp, 1/s².
