@@ -24,12 +24,9 @@ for rate in 500 2000; do
     sed "s/\"cycles=1\"/\"cycles=1\", \"rate_hz=$rate\"/" "$campaign/default.toml" >"at-$rate.toml"
     plant-sim campaign plan --cases "at-$rate.toml" --count 500 --seed 1 >"at-$rate.jsonl"
     judged plant-sim campaign run "at-$rate.jsonl" --out "at-$rate" >/dev/null
-    # Nothing is missed but what docs/safety.md does not promise: an encoder that is late in manual operation.
     plant-sim campaign merge "at-$rate" >"at-$rate.merged"
     [ "$(wc -l <"at-$rate.merged")" = 501 ]
-    grep '"missed":\["' "at-$rate.merged" >missed || true
-    late='"situation":"\(manual\|jogging\).*"encoder:[a-z]*:slow=.*"missed":\["reported"\]'
-    [ -z "$(grep -v "$late" missed | tee /dev/stderr)" ]
+    [ -z "$(grep '"missed":\["' "at-$rate.merged" | tee /dev/stderr)" ]
 done
 
 echo "- in two parts, one after the other"

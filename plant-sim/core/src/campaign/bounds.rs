@@ -6,6 +6,7 @@
 //! | an axis off its reference, too fast or out of its range is reported at the 4th sample in a row | default parameters: three samples, and one to answer |
 //! | in manual operation a tool faster than 250 mm/s is reported at the 4th sample in a row | ISO 10218-1; a tool is whatever lies within 100 mm of the axis of the flange |
 //! | and it is nowhere faster than that and what the greatest torques add to it in 8 samples, and free fall in the 30 ms of the brake | until then a fault may drive the arm |
+//! | but where an encoder is stuck or slow, 700 mm/s; where one is reversed, 1.2 m/s, from 1 kHz on 800 mm/s; both from 500 Hz on | nothing else tells its speed, and the loop is slow in manual operation: measured, `tests/stance.rs` |
 //! | torque is off 0.7 s after a fault was reported, with 22 kg | 1.25 times the time in which the slowest axis of the stretched arm stops from full speed with the torque that its weight leaves, and the time of the brake |
 //! | a brake that stays open is reported 60 ms and 8 samples after it was to close | the time of the brake, and of two controllers' answers |
 //! | while torque is on after that, the tool travels no further than at its greatest speed for the time of such a stop | the same |
@@ -28,6 +29,8 @@ use crate::plant::factor::Factor;
 use crate::plant::stop::EndStops;
 
 const LIFT: usize = 2;
+/// The place of the tool among the kinds of limits.
+const TOOL: usize = 3;
 
 /// Following error of an axis that stops the arm: rad, rad, m, rad.
 pub const FOLLOWING_ERROR: [f64; 4] = [0.05, 0.05, 0.01, 0.2];
@@ -51,10 +54,28 @@ const BRAKE_WAIT_S: f64 = 0.06;
 /// Speed of the tool in manual operation, m/s, at every point within so many m of the axis of the flange.
 const TOOL_SPEED: f64 = 0.25;
 const TOOL_REACH: f64 = 0.1;
+/// The same where a reading is wrong, and where it is reversed below 1 kHz and above; not below the rate.
+const MISREAD_SPEED: f64 = 0.7;
+const REVERSED_SPEED: [f64; 2] = [1.2, 0.8];
+const MISREAD_PERIOD: f64 = 1.0 / 500.0 * (1.0 + ROUNDING);
+const QUICK_PERIOD: f64 = 1.0 / 1000.0 * (1.0 + ROUNDING);
 /// Movement of a standing axis that does not count, rad and m.
 pub const STANDING: f64 = 1e-4;
 /// Rounding of f32 and of the integrator.
 const ROUNDING: f64 = 1e-4;
+
+/// What the encoders show of the arm, the worst last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Reading {
+    /// Where it is, or a step that is told at once.
+    Right,
+    /// Where it is, with a noise that a sound encoder does not have.
+    Noisy,
+    /// How one of its axes moved a while ago, that it does not, or some of both.
+    Wrong,
+    /// The way of one of its axes backwards.
+    Reversed,
+}
 
 /// Bounds for one robot and its payload.
 #[derive(Clone, Debug)]
@@ -112,9 +133,11 @@ impl Bounds {
 
     /// Whether an axis has been off its reference, too fast, or out of its range for so many samples in a row that it has to have been
     /// reported; `counts` counts them.
-    pub fn is_long_beyond(&self, counts: &mut [u32; 4], truth: &Truth) -> bool {
+    pub fn is_long_beyond(&self, counts: &mut [u32; 4], truth: &Truth, reading: Reading) -> bool {
         let Truth { plant, mind } = truth;
-        let beyond = self.is_beyond(&plant.q, &plant.qd, &mind.q);
+        let mut beyond = self.is_beyond(&plant.q, &plant.qd, &mind.q);
+        // Of the tool only the encoders tell.
+        beyond[TOOL] &= reading == Reading::Right || self.period > MISREAD_PERIOD;
         for (count, is_beyond) in counts.iter_mut().zip(beyond) {
             *count = if is_beyond { *count + 1 } else { 0 };
         }
@@ -146,8 +169,20 @@ impl Bounds {
         tool_speed(&self.arm.twist(&at, &Vector4::from(*qd)))
     }
 
+    /// The greatest speed of the tool where it may be told too late, as the encoders show another.
+    fn misread_speed(&self, reading: Reading) -> Option<f64> {
+        let [slow, quick] = REVERSED_SPEED;
+        match reading {
+            _ if self.period > MISREAD_PERIOD => None,
+            Reading::Right | Reading::Noisy => None,
+            Reading::Wrong => Some(MISREAD_SPEED),
+            Reading::Reversed if self.period > QUICK_PERIOD => Some(slow),
+            Reading::Reversed => Some(quick),
+        }
+    }
+
     /// Whether the tool is faster than a fault may make it until the arm is stopped.
-    pub fn is_tool_too_fast(&self, q: &[f64; 4], qd: &[f64; 4]) -> bool {
+    pub fn is_tool_too_fast(&self, q: &[f64; 4], qd: &[f64; 4], reading: Reading) -> bool {
         let excess = if self.is_manual {
             self.tool_speed(q, qd) - TOOL_SPEED
         } else {
@@ -155,6 +190,9 @@ impl Bounds {
         };
         if excess <= 0.0 {
             return false;
+        }
+        if let Some(greatest) = self.misread_speed(reading) {
+            return excess > greatest - TOOL_SPEED;
         }
         let at = self.arm.at(&Vector4::from(*q));
         let inertia = Factor::of(&(self.arm.mass_matrix(&at) + self.drive.rotor_inertia()));

@@ -323,6 +323,7 @@ impl Observer for Judge {
             self.reported_at = Some(answered.wrapping_add(1));
         }
         self.reports.look(self.mode);
+        let reading = self.faults.reading();
         let is_powered = self.is_powered();
         if is_powered && plant.tau == [0.0; 4] && self.last.is_some_and(|last| last.tau != [0.0; 4])
         {
@@ -333,7 +334,7 @@ impl Observer for Judge {
             && truth.mind.knows_where()
             // What the controller has not heard of it cannot report.
             && truth.is_answered()
-            && self.bounds.is_long_beyond(&mut self.beyond, truth)
+            && self.bounds.is_long_beyond(&mut self.beyond, truth, reading)
         {
             self.miss(Requirement::Reported);
         }
@@ -350,7 +351,7 @@ impl Observer for Judge {
             .catch(plant, now >= self.faults.caught_from());
         // What has caught the tool may pull an arm without torque.
         let is_pulled = plant.tau == [0.0; 4] && self.faults.catch_the_tool();
-        if !is_pulled && self.bounds.is_tool_too_fast(&plant.q, &plant.qd) {
+        if !is_pulled && self.bounds.is_tool_too_fast(&plant.q, &plant.qd, reading) {
             self.miss(Requirement::Slow);
         }
         if now >= self.faults.onset() && self.rest.is_none() {

@@ -3,6 +3,7 @@
 use protocol::messages::{Cause, Node};
 use protocol::time::{Duration, Instant, Period};
 
+use super::bounds::Reading;
 use super::causes;
 use super::due::{Hearts, Reach, Stage, due, reach};
 use super::expect::{Expected, expected, lateness, loses_count};
@@ -10,7 +11,7 @@ use super::verdict::Requirement;
 use crate::faults::{Fault, FrameFault, What};
 use crate::model::Payload;
 use crate::observer::PlantState;
-use crate::plant::defect::{BrakeDefect, LoadDefect, burdened};
+use crate::plant::defect::{BrakeDefect, EncoderDefect, LoadDefect, burdened};
 
 /// What breaks, and when: at the end of time as long as that is not known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -222,6 +223,17 @@ impl Spells {
                     | What::Slow(_)
             )
         })
+    }
+
+    /// What the encoders show.
+    pub(super) fn reading(&self) -> Reading {
+        let of = |spell: &Spell| match spell.what {
+            What::Encoder(_, EncoderDefect::Reversed) => Reading::Reversed,
+            What::Encoder(_, EncoderDefect::Stuck | EncoderDefect::Slow(_)) => Reading::Wrong,
+            What::Encoder(_, EncoderDefect::Noise(_)) => Reading::Noisy,
+            _ => Reading::Right,
+        };
+        self.all.iter().map(of).max().unwrap_or(Reading::Right)
     }
 
     /// Whether the number of a sample may not tell its time.
