@@ -280,11 +280,7 @@ impl Node {
         } else {
             self.late = 0;
         }
-        if self.controller.mode() == Mode::PreOperational
-            && self.same_schema == Some(true)
-            && feedback.status.contains(DriveStatus::ENCODER_VALID)
-            && self.controller.may_be_ready(feedback.status)
-        {
+        if self.controller.mode() == Mode::PreOperational && self.may_be_ready(feedback.status) {
             self.controller.event(Event::PeerReady);
         }
         let rated = self.controller.arm().drive.motor_torque_rated * 1e-3;
