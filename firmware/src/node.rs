@@ -339,12 +339,15 @@ impl Node {
         !matches!(verdict, Verdict::Duplicate | Verdict::Stale(_))
     }
 
-    fn send<B: Transmit>(&mut self, message: &Message, bus: &mut B) {
+    /// Returns whether there was room for it.
+    fn send<B: Transmit>(&mut self, message: &Message, bus: &mut B) -> bool {
         let sent = self
             .encoder
             .encode_with(message, |frame| bus.transmit(frame));
-        if !matches!(sent, Ok(Ok(()))) {
+        let is_sent = matches!(sent, Ok(Ok(())));
+        if !is_sent {
             self.unsent = self.unsent.saturating_add(1);
         }
+        is_sent
     }
 }

@@ -55,7 +55,7 @@ impl Controller {
             event => event.is_some_and(|event| self.event(event)),
         };
         if changed || (first && fault.cause == Cause::SelfTest) {
-            self.alarm.get_or_insert(fault);
+            self.keep_alarm(fault);
         } else {
             self.fault = before;
         }
@@ -198,7 +198,7 @@ impl Controller {
                 if self.misplaced == 0 {
                     // Told once, also where it changes nothing.
                     self.misplaced = 1;
-                    self.alarm.get_or_insert(fault);
+                    self.keep_alarm(fault);
                 }
             }
             _ => {
