@@ -15,9 +15,14 @@ use sim::scenario::Scenario;
 use sim::setup::RunConfig;
 
 fn judge(fault: &str) -> Verdict {
+    judge_all(&[fault])
+}
+
+fn judge_all(faults: &[impl AsRef<str>]) -> Verdict {
     let mut scenario = Scenario::built_in("gate").unwrap();
     scenario.cycles = 1;
-    scenario.faults = vec![fault.parse().unwrap()];
+    let faults = faults.iter().map(|fault| fault.as_ref().parse().unwrap());
+    scenario.faults = faults.collect();
     let connect = |config| Ok(InProcess::new(config));
     let (verdict, ..) = trial::run(&RunConfig::new(scenario), connect, &mut ()).unwrap();
     verdict
@@ -36,6 +41,19 @@ fn whoever_spoils_the_frames_of_others_may_be_told_as_their_bus_off() {
 fn torque_that_the_drives_have_cut_is_off() {
     for begin in [0.2521, 0.4, 0.5, 0.5993] {
         let verdict = judge(&format!("clock:misses=0.9@{begin}s"));
+        assert!(verdict.missed.is_empty(), "{begin}: {verdict:?}");
+    }
+}
+
+/// Drives whose clock is too fast take samples that are not those of the judge, and a controller that is off the bus leaves commands there that answer
+/// what came before its fault: they are sent after it.
+#[test]
+fn a_command_from_before_the_fault_is_none_after_it_whatever_the_clock() {
+    for begin in [0.4369, 0.5, 0.6125] {
+        let window = format!("{begin}s..{}s", begin + 0.06);
+        let faults = ["clock:drift=0.02", "command:bit-error"].map(|it| format!("{it}@{window}"));
+        let verdict = judge_all(&faults);
+        assert_eq!(verdict.detected.as_deref(), Some("bus-off"));
         assert!(verdict.missed.is_empty(), "{begin}: {verdict:?}");
     }
 }

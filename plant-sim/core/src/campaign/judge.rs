@@ -278,8 +278,10 @@ impl Judge {
 
 impl Observer for Judge {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
-        // Most frames, and the longest, are feedback, which is looked at for the brake only.
-        if table::FEEDBACK.identifies(frame) && self.newest.releases_brake() {
+        // Most frames, and the longest, are feedback, which is looked at for the brake only, and for what tells the time of a command where its
+        // number does not.
+        let is_counted = self.newest.counts || self.reports.latched().is_some();
+        if table::FEEDBACK.identifies(frame) && self.newest.releases_brake() && is_counted {
             return Ok(());
         }
         let Ok(received) = codec::decode(frame) else {
@@ -297,6 +299,9 @@ impl Observer for Judge {
             }
             Message::Heartbeat(node, _) => self.faults.hear(node),
             Message::Feedback(feedback) => {
+                if self.reports.latched().is_none() {
+                    self.reported_at = Some(feedback.sample);
+                }
                 let open = self.newest.brake_open(time, feedback.status);
                 if open > self.bounds.brake_told() && self.first().is_none() {
                     self.miss(Requirement::Detected);
@@ -316,12 +321,6 @@ impl Observer for Judge {
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         let plant = &truth.plant;
         self.mode = truth.mind.mode;
-        if self.reports.latched().is_none()
-            && let Some(answered) = truth.mind.sample
-        {
-            // The next one is answered before it is looked at here.
-            self.reported_at = Some(answered.wrapping_add(1));
-        }
         self.reports.look(self.mode);
         let is_powered = self.is_powered();
         if is_powered && plant.tau == [0.0; 4] && self.last.is_some_and(|last| last.tau != [0.0; 4])
