@@ -147,6 +147,7 @@ impl Spells {
                 || (is_held_up && causes::OUT.contains(&cause))
                 || (is_late && causes::LIE.contains(&cause))
                 || (is_of_loop && self.is_slow() && causes::LEFT.contains(&cause))
+                || (is_of_loop && self.is_fast() && cause == Cause::Late)
         };
         let mut begun = self.all.iter().filter(|spell| spell.from < Instant::MAX);
         // An emergency stop is the operator's.
@@ -161,6 +162,11 @@ impl Spells {
     /// Whether an arm may follow its last torques for so long that it leaves its reference, where commands stay out: below 1 kHz.
     fn is_slow(&self) -> bool {
         self.period.duration() > Duration::from_millis(1)
+    }
+
+    /// Whether a bus that has been held up may be so full of the loop's frames that they are late until it has caught up: above 1 kHz.
+    fn is_fast(&self) -> bool {
+        self.period.duration() < Duration::from_millis(1)
     }
 
     /// Those of several of which a run shows nothing: they have not acted, or another one had stopped the arm before, or was told.
