@@ -344,8 +344,9 @@ impl Observer for Judge {
         self.course
             .lift
             .catch(plant, now >= self.faults.caught_from());
-        // What has caught the tool may pull an arm without torque.
-        let is_pulled = plant.tau == [0.0; 4] && self.faults.catch_the_tool();
+        // What has caught the tool may pull an arm without torque, and so does the weight of a lift that nothing holds.
+        let is_pulled = plant.tau == [0.0; 4]
+            && (self.faults.catch_the_tool() || self.faults.let_the_lift_fall());
         if !is_pulled && self.bounds.is_tool_too_fast(&plant.q, &plant.qd) {
             self.miss(Requirement::Slow);
         }
