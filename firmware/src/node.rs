@@ -280,11 +280,7 @@ impl Node {
         } else {
             self.late = 0;
         }
-        if self.controller.mode() == Mode::PreOperational
-            && self.same_schema == Some(true)
-            && feedback.status.contains(DriveStatus::ENCODER_VALID)
-            && self.controller.may_be_ready(feedback.status)
-        {
+        if self.controller.mode() == Mode::PreOperational && self.may_be_ready(feedback.status) {
             self.controller.event(Event::PeerReady);
         }
         let rated = self.controller.arm().drive.motor_torque_rated * 1e-3;
@@ -343,12 +339,15 @@ impl Node {
         !matches!(verdict, Verdict::Duplicate | Verdict::Stale(_))
     }
 
-    fn send<B: Transmit>(&mut self, message: &Message, bus: &mut B) {
+    /// Returns whether there was room for it.
+    fn send<B: Transmit>(&mut self, message: &Message, bus: &mut B) -> bool {
         let sent = self
             .encoder
             .encode_with(message, |frame| bus.transmit(frame));
-        if !matches!(sent, Ok(Ok(()))) {
+        let is_sent = matches!(sent, Ok(Ok(())));
+        if !is_sent {
             self.unsent = self.unsent.saturating_add(1);
         }
+        is_sent
     }
 }

@@ -325,7 +325,7 @@ fn a_brake_that_does_not_hold_an_arm_without_torque_is_told() {
         controller.step(&open, &mut ());
         let alarm = controller.take_alarm().expect("it is told");
         assert_eq!(
-            (alarm.cause, alarm.value),
+            (alarm.cause, alarm.value()),
             (Cause::DriveFault, 69.0),
             "{state}"
         );

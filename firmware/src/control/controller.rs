@@ -18,8 +18,8 @@ mod transitions;
 use heapless::Deque;
 use nalgebra::Vector4;
 use protocol::messages::{
-    Cause, Compensation, ControlWord, Fault, LimitFlags, MotionReply, MotionRequest, Operation,
-    Outcome, Refusal,
+    Cause, Compensation, ControlWord, Emergency, Fault, LimitFlags, MotionReply, MotionRequest,
+    Operation, Outcome, Refusal,
 };
 use protocol::parameters::ControllerParameter as Parameter;
 use protocol::time::Period;
@@ -127,8 +127,6 @@ pub struct Controller {
     stuck: u32,
     /// Motor velocities in the last of them, rad/s.
     strained: Vector4<f32>,
-    /// A fault not reported to the peers yet.
-    alarm: Option<Fault>,
     /// What the last sample followed, as handed to the law.
     setpoint: Setpoint,
     memory: Memory,
@@ -144,6 +142,8 @@ pub struct Controller {
     arm: ArmModel,
     replies: Deque<MotionReply, { 2 * CAPACITY }>,
     unanswered: u16,
+    /// Faults not reported to the peers yet, in their order. Of more than one stop can have, the first are enough.
+    alarms: [Option<Emergency>; 3],
     stance: Stance,
     queue: MoveQueue,
 }
@@ -177,7 +177,6 @@ impl Controller {
             lift_held: None,
             is_placed: false,
             drives_on: false,
-            alarm: None,
             saturated: 0,
             stuck: 0,
             strained: Vector4::zeros(),
@@ -196,6 +195,7 @@ impl Controller {
             last_qd: Vector4::zeros(),
             replies: Deque::new(),
             unanswered: 0,
+            alarms: [None; 3],
         }
     }
 

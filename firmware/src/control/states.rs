@@ -49,7 +49,7 @@ listed! {
     pub enum Event {
         /// Known answers and the model are right.
         SelfTestPassed,
-        /// The drives speak the same protocol and their encoders are valid.
+        /// The drives speak the same protocol and their encoders are valid; or their brake is open, which is told from there.
         PeerReady,
         /// Operator: switch on.
         Enable,

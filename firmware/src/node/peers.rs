@@ -102,6 +102,18 @@ impl Node {
             .fail(Fault::value(Cause::DuplicateNode, id, 0.0));
     }
 
+    /// Whether the drives speak the same protocol and are where they have to be for an arm that is ready; or their brake has had its time and is
+    /// open, and the arm gets ready to tell it, whoever has greeted.
+    // Out of line: only before the arm is ready.
+    #[inline(never)]
+    pub(super) fn may_be_ready(&self, status: DriveStatus) -> bool {
+        if status.contains(DriveStatus::BRAKE_RELEASED) {
+            self.controller.is_unheld()
+        } else {
+            self.same_schema == Some(true) && status.contains(DriveStatus::ENCODER_VALID)
+        }
+    }
+
     /// Whether drives that should have torque have none, as when they have started anew.
     pub(super) fn has_let_go(&self, status: DriveStatus) -> bool {
         self.controller.expects_torque() && !status.contains(DriveStatus::TORQUE_ON)

@@ -1,7 +1,7 @@
 //! What the node sends besides the command and its answers to parameter requests.
 
 use protocol::bus::Transmit;
-use protocol::messages::{Emergency, Heartbeat, Message, Node as Name, State};
+use protocol::messages::{Heartbeat, Message, Node as Name, State};
 use protocol::time::{Duration, Instant};
 
 use super::Node;
@@ -18,11 +18,13 @@ impl Node {
         if let Some(reply) = self.controller.take_reply() {
             self.send(&Message::MotionReply(reply), bus);
         }
-        if let Some(alarm) = self.controller.take_alarm() {
+        // One that finds no room waits for it.
+        if let Some(alarm) = self.controller.alarm()
+            && self.send(&Message::Emergency(Name::Controller, alarm), bus)
+        {
+            self.controller.take_alarm();
             // The state that follows at once names the axis.
             self.next_state = now;
-            let emergency = Emergency::new(alarm.cause, alarm.value.to_bits());
-            self.send(&Message::Emergency(Name::Controller, emergency), bus);
         }
         if now >= self.next_state {
             self.next_state = now + STATE_PERIOD;

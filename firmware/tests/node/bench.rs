@@ -109,11 +109,11 @@ impl Bench {
         self.position[1] += (by * 50.0 / std::f64::consts::TAU * 131_072.0) as i32;
     }
 
-    /// Moves the lift 9 mm away, below the limit of the following error and more than its motor can correct with the torque that it may have for
-    /// ever, and which it has; 25 mm per turn.
+    /// Moves the lift 9 mm away, below the limit of the following error and more than its motor can correct with its greatest torque, of which it
+    /// has most; 25 mm per turn.
     pub(crate) fn strain(&mut self) {
         self.position[2] += (0.009 / 0.025 * 131_072.0) as i32;
-        self.torque[2] = -1000;
+        self.torque[2] = -2400;
     }
 
     /// Moves the elbow 75 mrad away, as fast as it can, and is in the first sample beyond its following error; then another 25 mrad.

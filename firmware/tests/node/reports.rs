@@ -3,10 +3,11 @@
 use firmware::control::phase::{Phase, Probe};
 use protocol::codec::encode;
 use protocol::messages::{
-    Message, Mode, MotionRequest, Nmt, NmtCommand, Node as Name, Posture, ResetReason, State,
+    Cause, Emergency, Message, Mode, MotionRequest, Nmt, NmtCommand, Node as Name, Posture,
+    ResetReason, State,
 };
 
-use crate::bench::{Bench, PERIOD, SILENCE};
+use crate::bench::{Bench, PERIOD, SILENCE, estop};
 
 #[test]
 fn state_and_heartbeat_come_at_their_rates() {
@@ -106,6 +107,69 @@ fn every_phase_of_a_sample_is_marked_once_and_in_order() {
         .node
         .poll_with(bench.now, None, &mut bench.wire, &mut marks);
     assert_eq!(marks.0, [Phase::Decode, Phase::Report]);
+}
+
+/// CiA 301: an emergency is sent once for every error, however long the bus has no room for it.
+#[test]
+fn a_fault_is_told_once_there_is_room_for_it() {
+    let mut bench = Bench::enabled();
+    bench.wire.full = true;
+    bench.wire.to_node.push_back(estop());
+    assert_eq!(bench.run(50), []);
+    assert_eq!(bench.mode(), Mode::EStop);
+    bench.wire.full = false;
+    let sent = bench.step();
+    let first: Vec<_> = sent.iter().take(3).collect();
+    assert!(
+        matches!(
+            first[..],
+            [
+                Message::Command(_),
+                Message::Emergency(
+                    Name::Controller,
+                    Emergency {
+                        cause: Cause::EStop,
+                        ..
+                    }
+                ),
+                Message::State(State {
+                    cause: Cause::EStop,
+                    ..
+                }),
+            ]
+        ),
+        "{sent:?}"
+    );
+    let again = |message: &Message| matches!(message, Message::Emergency(..));
+    assert!(!bench.run(50).iter().any(again));
+}
+
+/// Nor does one hide another: whoever hears that the arm stops has to hear that its brake closes instead.
+#[test]
+fn every_fault_that_changes_the_state_is_told() {
+    for is_full in [false, true] {
+        let mut bench = Bench::moving();
+        bench.wire.full = is_full;
+        bench.node.bus_off();
+        bench.node.bus_off();
+        bench.wire.to_node.push_back(estop());
+        let mut sent = bench.run(3);
+        bench.wire.full = false;
+        sent.extend(bench.run(10));
+        let told: Vec<_> = sent
+            .iter()
+            .filter_map(|message| match message {
+                Message::Emergency(_, emergency) => Some(emergency.cause),
+                _ => None,
+            })
+            .collect();
+        // Stop, brake, emergency stop.
+        assert_eq!(
+            told,
+            [Cause::BusOff, Cause::BusOff, Cause::EStop],
+            "{is_full}"
+        );
+    }
 }
 
 /// A jump so slow that an arm standing still does not trip the monitor.

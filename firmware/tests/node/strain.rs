@@ -125,7 +125,7 @@ fn an_encoder_that_does_not_move_under_full_torque_is_stuck() {
         bench.enable();
         assert_eq!(bench.mode(), Mode::Enabled);
         bench.shove(off.into());
-        bench.torque[1] = -1000;
+        bench.torque[1] = -2100;
         for sample in 1..=samples {
             assert_eq!(bench.mode(), Mode::Enabled, "{following} {rate}: {sample}");
             bench.step();
@@ -140,6 +140,25 @@ fn an_encoder_that_does_not_move_under_full_torque_is_stuck() {
             (fault.value + off).abs() < 1e-5 && (fault.limit - 0.05 * following).abs() < 1e-6,
             "{fault:?}"
         );
+    }
+}
+
+/// Drives that miss their commands go on with an older one: an axis that stands under that does as it was told.
+#[test]
+fn an_axis_that_holds_with_an_older_torque_is_not_stuck() {
+    // Of 2,516 thousandths of the rated torque; 680 hold 22 kg at the lift.
+    for (held, expected) in [
+        (680, Cause::None),
+        (1900, Cause::None),
+        (2100, Cause::StuckSensor),
+    ] {
+        let mut bench = Bench::with(by_itself());
+        bench.enable();
+        bench.shove(0.01);
+        bench.torque[1] = -held;
+        bench.run(20);
+        let fault = *bench.node.controller().fault();
+        assert_eq!(fault.cause, expected, "{held}: {fault}");
     }
 }
 

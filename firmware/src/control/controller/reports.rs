@@ -1,7 +1,7 @@
 //! What the controller tells about itself.
 
 use nalgebra::Vector4;
-use protocol::messages::{Cause, Fault, LimitFlags, Mode, MotionReply};
+use protocol::messages::{Cause, Emergency, Fault, LimitFlags, Mode, MotionReply};
 
 use super::Controller;
 use crate::control::laws::Selection;
@@ -31,9 +31,24 @@ impl Controller {
         self.fault.cause
     }
 
-    /// A fault not reported to the peers yet; each is returned once.
-    pub fn take_alarm(&mut self) -> Option<Fault> {
-        self.alarm.take()
+    /// The first fault not reported to the peers yet.
+    pub fn alarm(&self) -> Option<Emergency> {
+        let [first, ..] = self.alarms;
+        first
+    }
+
+    /// The same, once it has been reported.
+    pub fn take_alarm(&mut self) -> Option<Emergency> {
+        let [first, second, third] = self.alarms;
+        self.alarms = [second, third, None];
+        first
+    }
+
+    pub(super) fn keep_alarm(&mut self, fault: Fault) {
+        let free = self.alarms.iter_mut().find(|alarm| alarm.is_none());
+        if let Some(free) = free {
+            *free = Some(Emergency::new(fault.cause, fault.value.to_bits()));
+        }
     }
 
     /// The robot.

@@ -19,8 +19,8 @@ const STUCK_SAMPLES: u32 = 2;
 /// is meant to: it has [`PATIENCE`] times as long.
 const STUCK_ERROR: f32 = 0.05;
 const PATIENCE: u32 = 8;
-/// Share of its greatest torque that the motor of such an axis has at least, by its drive. It builds up in a few samples.
-const PULLS: f32 = 0.25;
+/// Share of the torque of the last command that the motor of such an axis has at least, by its drive.
+const PULLS: f32 = 0.8;
 /// How much faster a motor gets whose axis turns back however much the others work against it, rad/s². Its encoder moves.
 const TURNING: f32 = 100.0;
 /// Share of its greatest speed below which an axis hardly moves. It passes that within milliseconds when it turns back.
@@ -99,15 +99,16 @@ impl Controller {
         }
     }
 
-    /// Whether the encoder of an axis does not move while its motor pulls and is to pull with all it has. Where commands are lost, drives go on with
-    /// older ones.
+    /// Whether the encoder of an axis does not move while its motor is to pull with all it has, and pulls as it was told. Where commands are lost,
+    /// drives go on with older ones.
     // Out of line, for the size of four copies.
     #[inline(never)]
     fn strains(&self, axis: Axis, readings: &Readings) -> bool {
         let excess = axis.of(&self.excess);
-        let pull = axis.of(&readings.torque) * excess.signum();
-        let greatest = axis.of(&self.arm.drive.motor_torque_limit);
-        excess != 0.0 && readings.is_still(axis) && pull >= PULLS * greatest
+        let side = excess.signum();
+        let pull = axis.of(&readings.torque) * side;
+        let told = axis.of(&self.chatter.last()) * side;
+        excess != 0.0 && readings.is_still(axis) && pull >= PULLS * told
     }
 
     /// What need not be done in every sample. Looks for chatter, and accounts for the heat of the motors: too much of it slows down the moves

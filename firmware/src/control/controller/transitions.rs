@@ -55,7 +55,7 @@ impl Controller {
             event => event.is_some_and(|event| self.event(event)),
         };
         if changed || (first && fault.cause == Cause::SelfTest) {
-            self.alarm.get_or_insert(fault);
+            self.keep_alarm(fault);
         } else {
             self.fault = before;
         }
@@ -198,7 +198,7 @@ impl Controller {
                 if self.misplaced == 0 {
                     // Told once, also where it changes nothing.
                     self.misplaced = 1;
-                    self.alarm.get_or_insert(fault);
+                    self.keep_alarm(fault);
                 }
             }
             _ => {
@@ -237,13 +237,8 @@ impl Controller {
         }
     }
 
-    /// Whether the brake, by this status, is where it has to be for an arm that is ready, or has had its time and the arm gets ready to tell it.
-    pub fn may_be_ready(&self, status: DriveStatus) -> bool {
-        !status.contains(DriveStatus::BRAKE_RELEASED) || self.is_unheld()
-    }
-
     /// Whether an arm without torque has been without its brake for longer than that takes to close.
-    fn is_unheld(&self) -> bool {
+    pub fn is_unheld(&self) -> bool {
         self.misplaced >= self.brake_samples()
     }
 

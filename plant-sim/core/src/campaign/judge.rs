@@ -278,8 +278,10 @@ impl Judge {
 
 impl Observer for Judge {
     fn frame(&mut self, time: Instant, frame: &CanFrame) -> io::Result<()> {
-        // Most frames, and the longest, are feedback, which is looked at for the brake only.
-        if table::FEEDBACK.identifies(frame) && self.newest.releases_brake() {
+        // Most frames, and the longest, are feedback, which is looked at for the brake only, and for what tells the time of a command where its
+        // number does not.
+        let is_counted = self.newest.counts || self.reports.latched().is_some();
+        if table::FEEDBACK.identifies(frame) && self.newest.releases_brake() && is_counted {
             return Ok(());
         }
         let Ok(received) = codec::decode(frame) else {
@@ -292,11 +294,11 @@ impl Observer for Judge {
             {
                 self.reports.take(time, cause);
             }
-            Message::State(state) if state.cause != Cause::None && self.faults.pile_up() => {
-                self.reports.repeat(time, state.cause);
-            }
             Message::Heartbeat(node, _) => self.faults.hear(node),
             Message::Feedback(feedback) => {
+                if self.reports.latched().is_none() {
+                    self.reported_at = Some(feedback.sample);
+                }
                 let open = self.newest.brake_open(time, feedback.status);
                 if open > self.bounds.brake_told() && self.first().is_none() {
                     self.miss(Requirement::Detected);
@@ -316,12 +318,6 @@ impl Observer for Judge {
     fn sample(&mut self, truth: &Truth) -> io::Result<()> {
         let plant = &truth.plant;
         self.mode = truth.mind.mode;
-        if self.reports.latched().is_none()
-            && let Some(answered) = truth.mind.sample
-        {
-            // The next one is answered before it is looked at here.
-            self.reported_at = Some(answered.wrapping_add(1));
-        }
         self.reports.look(self.mode);
         let reading = self.faults.reading();
         let is_powered = self.is_powered();
@@ -349,8 +345,9 @@ impl Observer for Judge {
         self.course
             .lift
             .catch(plant, now >= self.faults.caught_from());
-        // What has caught the tool may pull an arm without torque.
-        let is_pulled = plant.tau == [0.0; 4] && self.faults.catch_the_tool();
+        // What has caught the tool may pull an arm without torque, and so does the weight of a lift that nothing holds.
+        let is_pulled = plant.tau == [0.0; 4]
+            && (self.faults.catch_the_tool() || self.faults.let_the_lift_fall());
         if !is_pulled && self.bounds.is_tool_too_fast(&plant.q, &plant.qd, reading) {
             self.miss(Requirement::Slow);
         }

@@ -148,6 +148,7 @@ impl Spells {
                 || (is_held_up && causes::OUT.contains(&cause))
                 || (is_late && causes::LIE.contains(&cause))
                 || (is_of_loop && self.is_slow() && causes::LEFT.contains(&cause))
+                || (is_of_loop && self.is_fast() && cause == Cause::Late)
         };
         let mut begun = self.all.iter().filter(|spell| spell.from < Instant::MAX);
         // An emergency stop is the operator's.
@@ -162,6 +163,11 @@ impl Spells {
     /// Whether an arm may follow its last torques for so long that it leaves its reference, where commands stay out: below 1 kHz.
     fn is_slow(&self) -> bool {
         self.period.duration() > Duration::from_millis(1)
+    }
+
+    /// Whether a bus that has been held up may be so full of the loop's frames that they are late until it has caught up: above 1 kHz.
+    fn is_fast(&self) -> bool {
+        self.period.duration() < Duration::from_millis(1)
     }
 
     /// Those of several of which a run shows nothing: they have not acted, or another one had stopped the arm before, or was told.
@@ -209,20 +215,6 @@ impl Spells {
     /// counted in ticks that the drives miss, which then have let go by a clock of their own.
     pub(super) fn keep_torque_on(&self, have_let_go: bool) -> bool {
         self.leave_the_brake_open() || (have_let_go && self.lose_count())
-    }
-
-    /// Whether so many frames may wait for the bus that a report finds no room among them, and State alone tells its cause.
-    pub(super) fn pile_up(&self) -> bool {
-        self.any(|what| {
-            matches!(
-                what,
-                What::Attempts(..)
-                    | What::Misreads(..)
-                    | What::Babbling(_)
-                    | What::Wires(_)
-                    | What::Slow(_)
-            )
-        })
     }
 
     /// What the encoders show.
