@@ -7,7 +7,7 @@ use nalgebra::Vector4;
 
 use super::Pose;
 use crate::mechanics::arm::{ArmModel, Axis, Geometry, JointLimits};
-use crate::mechanics::math::{atan2, clamp, greatest, hypot, sin_cos, sqrt, wrap};
+use crate::mechanics::math::{angle, atan2, clamp, greatest, hypot, sin_cos, sqrt, wrap};
 
 /// How far out of reach a radius may be and still count as on the boundary, as a fraction of the stretched arm: 8 u,
 /// half a micrometre per metre.
@@ -197,8 +197,8 @@ pub(crate) fn planar(
     let (s1, c1) = (y * along - x * across, x * along + y * across);
     let share = 1.0 / square;
     Ok(Planar {
-        theta1: atan2(s1, c1),
-        theta2: atan2(s2, c2),
+        theta1: angle(s1, c1),
+        theta2: angle(s2, c2),
         shoulder: (s1 * share, c1 * share),
         s2,
     })
