@@ -16,13 +16,13 @@
 //! at the same time they may need too high a rate, and none where one does before the other. So shorter ones follow until one keeps
 //! them; none is as good as a stop at the corner.
 
-use nalgebra::Vector4;
+use nalgebra::{Vector3, Vector4};
 
 use super::verify::Before;
 use super::{Planner, Stage};
-use crate::mechanics::arm::Geometry;
+use crate::mechanics::arm::{ArmModel, Geometry};
 use crate::mechanics::jacobian::Jacobian;
-use crate::mechanics::kinematics::{self, Trig};
+use crate::mechanics::kinematics::{self, Pose, Trig};
 use crate::mechanics::math::{least, sqrt};
 use crate::trajectory::path::{Path, check_limits};
 use crate::trajectory::tool_speed::{self, PLANNED};
@@ -57,6 +57,8 @@ pub(super) struct Blend {
     /// By how much the next one of a bisection differs from it, s.
     step: f32,
     round: u8,
+    /// Flange at the corner, m.
+    corner: Vector3<f32>,
     /// Time in the overlap of the instant that is next, s.
     instant: f32,
     /// What is known of it.
@@ -78,7 +80,7 @@ enum Motion {
 impl Planner {
     /// Begins to look for the overlap of a move with the one after it, unless the arm is to stop between them. The next one does not get to its
     /// speed before this one has begun to brake, and no move overlaps with two at a time: each side gets half of it.
-    pub fn begin_blend(&mut self, first: &Trajectory, next: &Trajectory) {
+    pub fn begin_blend(&mut self, arm: &ArmModel, first: &Trajectory, next: &Trajectory) {
         let half = 0.5 * least(first.duration(), next.duration());
         let most = least(half, first.braking() + next.speeding_up());
         if first.zone > 0.0 && most > 0.0 {
@@ -87,6 +89,7 @@ impl Planner {
                 tried: 0.5 * most,
                 step: 0.25 * most,
                 round: 0,
+                corner: flange(&arm.geometry, &first.end),
                 instant: 0.5 * most,
                 motion: Motion::Unknown,
                 before: None,
@@ -203,9 +206,11 @@ impl Blend {
             Motion::First(reference) => {
                 let mut setpoint = Setpoint::rest(reference.q);
                 setpoint.reference = reference;
-                if first.add(next, arm, t, 0.0, &mut setpoint).is_err()
-                    || distance(&arm.geometry, &setpoint.reference.q, &first.end) > first.zone
-                {
+                if first.add(next, arm, t, 0.0, &mut setpoint).is_err() {
+                    return Some(false);
+                }
+                let off = flange(&arm.geometry, &setpoint.reference.q) - self.corner;
+                if sqrt(off.dot(&off)) > first.zone {
                     return Some(false);
                 }
                 self.motion = Motion::Both(setpoint.reference);
@@ -267,13 +272,11 @@ fn most_tool_speed(first: &Trajectory, next: &Trajectory) -> f32 {
     }
 }
 
-/// Distance of the flange from that of other joint positions, m.
+/// Position of the flange, m.
 #[inline(never)]
-fn distance(geometry: &Geometry, q: &Vector4<f32>, corner: &Vector4<f32>) -> f32 {
-    let here = kinematics::forward(geometry, q);
-    let there = kinematics::forward(geometry, corner);
-    let offset = Vector4::new(here.x - there.x, here.y - there.y, here.z - there.z, 0.0);
-    sqrt(offset.dot(&offset))
+fn flange(geometry: &Geometry, q: &Vector4<f32>) -> Vector3<f32> {
+    let Pose { x, y, z, .. } = kinematics::forward(geometry, q);
+    Vector3::new(x, y, z)
 }
 
 impl Trajectory {
