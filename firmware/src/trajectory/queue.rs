@@ -267,7 +267,7 @@ impl MoveQueue {
             let trajectory = *self.planner.trajectory();
             self.plan_end = trajectory.end;
             if let Some(first) = self.moves.back() {
-                self.planner.begin_blend(budget.arm, first, &trajectory);
+                self.planner.begin_blend(first, &trajectory);
             }
             // Room was checked when the planner took the request.
             let _ = self.moves.push_back(trajectory);

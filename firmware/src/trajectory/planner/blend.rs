@@ -20,7 +20,7 @@ use nalgebra::{Vector3, Vector4};
 
 use super::verify::Before;
 use super::{Planner, Stage};
-use crate::mechanics::arm::{ArmModel, Geometry};
+use crate::mechanics::arm::Geometry;
 use crate::mechanics::jacobian::Jacobian;
 use crate::mechanics::kinematics::{self, Pose, Trig};
 use crate::mechanics::math::{least, sqrt};
@@ -57,8 +57,6 @@ pub(super) struct Blend {
     /// By how much the next one of a bisection differs from it, s.
     step: f32,
     round: u8,
-    /// Flange at the corner, m.
-    corner: Vector3<f32>,
     /// Time in the overlap of the instant that is next, s.
     instant: f32,
     /// What is known of it.
@@ -80,7 +78,7 @@ enum Motion {
 impl Planner {
     /// Begins to look for the overlap of a move with the one after it, unless the arm is to stop between them. The next one does not get to its
     /// speed before this one has begun to brake, and no move overlaps with two at a time: each side gets half of it.
-    pub fn begin_blend(&mut self, arm: &ArmModel, first: &Trajectory, next: &Trajectory) {
+    pub fn begin_blend(&mut self, first: &Trajectory, next: &Trajectory) {
         let half = 0.5 * least(first.duration(), next.duration());
         let most = least(half, first.braking() + next.speeding_up());
         if first.zone > 0.0 && most > 0.0 {
@@ -89,7 +87,6 @@ impl Planner {
                 tried: 0.5 * most,
                 step: 0.25 * most,
                 round: 0,
-                corner: flange(&arm.geometry, &first.end),
                 instant: 0.5 * most,
                 motion: Motion::Unknown,
                 before: None,
@@ -209,7 +206,12 @@ impl Blend {
                 if first.add(next, arm, t, 0.0, &mut setpoint).is_err() {
                     return Some(false);
                 }
-                let off = flange(&arm.geometry, &setpoint.reference.q) - self.corner;
+                // Where the next move is a curve it begins there.
+                let corner = match &next.path {
+                    Path::Joint { .. } => flange(&arm.geometry, &first.end),
+                    Path::Tool { curve, .. } => curve.start(),
+                };
+                let off = flange(&arm.geometry, &setpoint.reference.q) - corner;
                 if sqrt(off.dot(&off)) > first.zone {
                     return Some(false);
                 }
