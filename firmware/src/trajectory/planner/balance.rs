@@ -50,7 +50,7 @@ impl Planner {
         }
     }
 
-    /// One sample of one half: the end of its hold next to rest, the one next to the peak speed, and in the last round its middle. Along a curve
+    /// One sample of one half: the end of its hold next to rest, the one next to the peak speed, and in the last round its middle. Along an arc
     /// its torques take a step of their own.
     #[inline(never)]
     pub(super) fn balance(
@@ -70,7 +70,7 @@ impl Planner {
         };
         let along = profile.between_ramps(braking, share);
         let here = self.point(budget.arm, along.s)?;
-        if matches!(self.draft.path, Path::Joint { .. }) {
+        if !self.draft.path.is_arc() {
             self.weigh(budget, (&here, &along), round, point, wanted);
         } else {
             self.stage = Stage::Weigh {

@@ -4,8 +4,8 @@ use super::{Planner, Stage};
 use crate::trajectory::path::Path;
 use crate::trajectory::request::Target;
 
-/// Of a step that leaves no room for another one.
-const ALONE: u16 = u16::MAX;
+/// Of a step that leaves no room for another one; none takes more.
+const ALONE: u16 = 1_400;
 
 impl Planner {
     /// Instructions of a Cortex-M4F that the next step takes at the most. They are stated here, and not measured while it runs: whatever

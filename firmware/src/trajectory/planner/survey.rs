@@ -39,7 +39,7 @@ impl Apex {
 }
 
 impl Planner {
-    /// Reach, limits and the largest joint travel per unit of path; after the last point the bounds that follow from it, of a curve in a step of
+    /// Reach, limits and the largest joint travel per unit of path; after the last point the bounds that follow from it, of an arc in a step of
     /// their own.
     #[inline(never)]
     pub(super) fn survey(
@@ -84,7 +84,7 @@ impl Planner {
         if point == 0 {
             budget.check_creep()?;
         }
-        if point < points || curve.is_some() {
+        if point < points || self.draft.path.is_arc() {
             self.stage = Stage::Survey {
                 point: point + 1,
                 fastest,
