@@ -305,7 +305,7 @@ impl Node {
         self.samples = self.samples.wrapping_add(1);
         let planned = if self.samples.is_multiple_of(REPORT_SAMPLES) {
             self.listen(feedback.sample);
-            self.controller.tend(REPORT_SAMPLES);
+            self.controller.look();
             false
         } else {
             self.controller.plan_or_watch(&readings, self.samples)

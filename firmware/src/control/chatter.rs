@@ -133,7 +133,9 @@ impl Chatter {
     pub fn cut(&mut self, excess: &Vector4<f32>, rise: &Vector4<f32>) -> Option<Axis> {
         let now = self.kept;
         let mut swinging = None;
-        let axes = Axis::ALL.into_iter().zip(excess.iter().zip(rise.iter()));
+        let axes = Axis::ALL
+            .into_iter()
+            .zip(excess.as_slice().iter().zip(rise.as_slice()));
         for ((axis, (excess, rise)), cut) in axes.zip(self.cuts.iter_mut()) {
             if *excess == 0.0 {
                 continue;

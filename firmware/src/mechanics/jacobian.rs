@@ -61,6 +61,25 @@ impl Jacobian {
         }
     }
 
+    /// The same of an arm whose flange is at this position in x and y of frame 0 (m), with the sine and cosine of theta1, and the sine of theta2.
+    #[inline(always)]
+    pub(crate) fn of_place(
+        geometry: &Geometry,
+        (x, y): (f32, f32),
+        (s1, c1): (f32, f32),
+        s2: f32,
+    ) -> Self {
+        Self {
+            x1: -y,
+            x2: geometry.a1 * s1 - y,
+            y1: x,
+            y2: x - geometry.a1 * c1,
+            s2,
+            determinant: geometry.a1 * geometry.a2 * s2,
+            onset: DAMPING_ONSET * geometry.reach(),
+        }
+    }
+
     /// The geometric Jacobian, rows vx, vy, vz, wx, wy, wz (paper, eq. 27).
     #[must_use]
     pub fn geometric(&self) -> Matrix6x4<f32> {

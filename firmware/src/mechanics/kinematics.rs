@@ -8,7 +8,7 @@ use crate::mechanics::arm::Geometry;
 use crate::mechanics::math::{sin_cos, wrap};
 
 pub use ik::{Elbow, IkError, LIMIT_TOLERANCE, REACH_TOLERANCE, Wrist, inverse, locate, solve};
-pub(crate) use ik::{check_range, shorter_way, within_limits};
+pub(crate) use ik::{Planar, check_range, planar, shorter_way, within_limits};
 
 /// Sines and cosines of one joint position, computed once per tick and shared by everything that needs them.
 #[derive(Debug, Clone, Copy, PartialEq)]

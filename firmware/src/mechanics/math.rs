@@ -5,7 +5,7 @@
 //!
 //! `u` = 2^-24 below is the unit roundoff of `f32`.
 
-use core::f32::consts::{FRAC_2_PI, PI, TAU};
+use core::f32::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 /// 1.5 * 2^23. Adding it rounds a number of magnitude below 2^22 to the nearest integer, which the FPU does in one
 /// instruction, and leaves that integer, modulo a power of two, in the low bits of the sum.
@@ -145,6 +145,33 @@ pub fn hypot(x: f32, y: f32) -> f32 {
 #[must_use]
 pub fn atan2(y: f32, x: f32) -> f32 {
     libm::atan2f(y, x)
+}
+
+/// As [`atan2`] with less than two thirds of its instructions, for what is asked for in every sample; not a number for the zero vector. Error at most
+/// 4 u relative.
+///
+/// The angle from the nearer axis, or from the diagonal where it is more than half way there, so that its tangent is at most tan(pi/8); and
+/// for that the polynomial of Cephes (Moshier 1989).
+#[inline(never)]
+#[must_use]
+pub fn angle(y: f32, x: f32) -> f32 {
+    const TAN: [f32; 4] = [-0.333_329_5, 0.199_777_11, -0.138_776_86, 8.053_744_5e-2];
+    let (wide, high) = (x.abs(), y.abs());
+    let (long, short) = (greatest(wide, high), least(wide, high));
+    let (from, t) = if short > 0.414_213_57 * long {
+        (FRAC_PI_4, (short - long) / (short + long))
+    } else {
+        (0.0, short / long)
+    };
+    let z = t * t;
+    let angle = from + (t + t * z * (TAN[0] + z * (TAN[1] + z * (TAN[2] + z * TAN[3]))));
+    let angle = if high > wide {
+        FRAC_PI_2 - angle
+    } else {
+        angle
+    };
+    let angle = if x < 0.0 { PI - angle } else { angle };
+    angle.copysign(y)
 }
 
 /// The angle (rad) without whole turns, in (-pi, pi]. An angle already in that range is returned unchanged, to the bit.

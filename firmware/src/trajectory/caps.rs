@@ -2,8 +2,8 @@
 
 use nalgebra::Vector4;
 
-use super::Reference;
-use super::torque_budget::{Ramp, TorqueBudget, ratio, slower};
+use super::Rates;
+use super::torque_budget::{TorqueBudget, ratio, slower};
 use crate::mechanics::math::{cbrt, sqrt};
 
 impl TorqueBudget<'_> {
@@ -26,26 +26,39 @@ impl TorqueBudget<'_> {
         acceleration.min(cbrt(within(&limits.jerk, &jerk)))
     }
 
-    /// Keeps a change of the time scale within the limits, with this share of the jerk: of a trajectory whose motion is `rest`, and
-    /// which would have the speed `qd` at full pace.
+    /// Keeps the change of the slope of a time scale within this share of the limits of jerk, for a trajectory whose motion is `rates`.
     #[cold]
-    pub(super) fn cap_ramp(
+    pub(super) fn cap_bend(&self, rates: &Rates, share: f32, bend: f32) -> f32 {
+        let joints = rates
+            .qd
+            .as_slice()
+            .iter()
+            .zip(self.arm.limits.jerk.as_slice());
+        joints.fold(bend, |bend, (qd, jerk)| slower(bend, share * jerk, *qd))
+    }
+
+    /// Keeps the slope of a time scale, of one that is to get `faster` or slower, within the limits of acceleration, likewise.
+    #[cold]
+    pub(super) fn cap_slope(
         &self,
-        rest: &Reference,
-        qd: &Vector4<f32>,
-        share: f32,
-        ramp: &mut Ramp,
-    ) {
-        let limits = &self.arm.limits;
-        let joints = qd.iter().zip(rest.qdd.iter());
-        for ((qd, qdd), (acceleration, jerk)) in
-            joints.zip(limits.acceleration.iter().zip(limits.jerk.iter()))
-        {
-            // An acceleration along the motion leaves more room for slowing down, and less for speeding up.
-            let own = if *qd > 0.0 { *qdd } else { -qdd };
-            ramp.slower = slower(ramp.slower, (acceleration + own).max(0.0), *qd);
-            ramp.faster = slower(ramp.faster, (acceleration - own).max(0.0), *qd);
-            ramp.bend = slower(ramp.bend, share * jerk, *qd);
-        }
+        rates: &Rates,
+        time_scale: f32,
+        faster: bool,
+        steepest: f32,
+    ) -> f32 {
+        let joints = rates.qd.as_slice().iter().zip(rates.qdd.as_slice());
+        let limits = self.arm.limits.acceleration.as_slice();
+        joints
+            .zip(limits)
+            .fold(steepest, |steepest, ((qd, qdd), limit)| {
+                // An acceleration along the motion leaves more room for slowing down, and less for speeding up.
+                let own = qdd * (time_scale * time_scale);
+                let left = if (*qd > 0.0) == faster {
+                    limit - own
+                } else {
+                    limit + own
+                };
+                slower(steepest, left.max(0.0), *qd)
+            })
     }
 }

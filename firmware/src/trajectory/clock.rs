@@ -1,9 +1,9 @@
 //! The clock of a trajectory: runs with the samples, slower than they do, or not at all. Whatever it does, the arm stays on its
 //! path.
 
-use super::Rates;
-use super::torque_budget::Ramp;
-use crate::mechanics::math::{clamp, greatest, sqrt};
+use super::torque_budget::TorqueBudget;
+use super::{Rates, Setpoint};
+use crate::mechanics::math::{clamp, greatest, least, sqrt};
 
 /// Trajectory time in whole samples plus a fraction, so that long moves keep their resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,14 +112,20 @@ impl Clock {
         }
     }
 
-    /// Chooses the next slope towards the pace: as steep as the torque allows, no sooner than it can be built up, and flattening
-    /// towards the pace.
-    pub fn ramp(&mut self, ramp: &Ramp, period: f32) {
-        let Ramp {
-            slower,
-            faster,
-            bend,
-        } = *ramp;
+    /// Chooses the next slope towards the pace, of a trajectory whose own motion is `setpoint`: as steep as the torque allows, no sooner than
+    /// with this share of its rates it can be built up, flattening towards the pace, and one that is `stopping` gets no faster.
+    pub fn ramp(
+        &mut self,
+        budget: &TorqueBudget<'_>,
+        setpoint: &Setpoint,
+        share: f32,
+        period: f32,
+        stopping: bool,
+    ) {
+        // The torque is that of the instant in which the command acts.
+        let ahead = &setpoint.ahead;
+        let need = budget.need(&setpoint.reference.q, ahead, self.time_scale);
+        let bend = budget.bend(&need, ahead, share);
         if !bend.is_finite() {
             // At rest on the trajectory, where any time scale is as good as another.
             self.time_scale = self.pace;
@@ -134,7 +140,17 @@ impl Clock {
         };
         let toward = (toward + bend * period).min(flare);
         let slope = if left < 0.0 { -toward } else { toward };
-        self.slope = clamp(slope, -slower, faster);
+        let faster = slope > 0.0;
+        let steepest = if faster && stopping {
+            0.0
+        } else {
+            budget.steepest(&need, ahead, self.time_scale, faster)
+        };
+        self.slope = if faster {
+            least(slope, steepest)
+        } else {
+            greatest(slope, -steepest)
+        };
     }
 
     /// The velocities and accelerations of the trajectory as the clock runs through them, `later` seconds from now.

@@ -84,6 +84,13 @@ impl Curve {
         })
     }
 
+    /// Where it begins, m.
+    pub(super) fn start(&self) -> Vector3<f32> {
+        match self {
+            Self::Line { start, .. } | Self::Arc { start, .. } => *start,
+        }
+    }
+
     /// The place at `s`.
     // In line: a place is nine numbers, which would go over the stack in every sample.
     #[inline(always)]

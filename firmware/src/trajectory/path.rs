@@ -6,7 +6,7 @@ use super::Lift;
 use super::curve::{Curve, Place};
 use crate::mechanics::arm::ArmModel;
 use crate::mechanics::jacobian::Jacobian;
-use crate::mechanics::kinematics::{self, Elbow, IkError, Pose, Trig};
+use crate::mechanics::kinematics::{self, Elbow, IkError, Planar};
 
 /// Joint positions and their derivatives with respect to the path coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,28 +102,30 @@ impl Path {
                     tangent,
                     bend,
                 } = curve.at(s);
-                let pose = Pose {
-                    x: position.x,
-                    y: position.y,
-                    z: position.z,
-                    yaw: yaw + turned * s,
-                };
-                let mut q = kinematics::solve(&arm.geometry, &pose, *elbow)
+                let place = (position.x, position.y);
+                let Planar {
+                    theta1,
+                    theta2,
+                    shoulder,
+                    s2,
+                } = kinematics::planar(&arm.geometry, place, *elbow)
                     .map_err(PathError::Unreachable)?;
-                q.w = q.x + q.y - pose.yaw;
-                let trig = Trig::new(&q);
-                let singular = PathError::Singular { sin_elbow: trig.s2 };
-                if trig.s2.abs() < MIN_SIN_ELBOW {
-                    return Err(singular);
+                if s2.abs() < MIN_SIN_ELBOW {
+                    return Err(PathError::Singular { sin_elbow: s2 });
                 }
+                let geometry = &arm.geometry;
+                let q = Vector4::new(
+                    theta1,
+                    theta2,
+                    geometry.d1 - geometry.d4 - position.z,
+                    theta1 + theta2 - (yaw + turned * s),
+                );
                 // q' = J^-1 x', q'' = J^-1 (x'' - (dJ/ds) q'). The Jacobian's rate along the path has the same form as its rate
                 // in time, with q' for qd.
-                let jacobian = Jacobian::new(&arm.geometry, &trig);
-                let dq = jacobian
-                    .joint_speed(&tangent.push(*turned))
-                    .ok_or(singular)?;
+                let jacobian = Jacobian::of_place(geometry, place, shoulder, s2);
+                let dq = jacobian.joint_speed_undamped(&tangent.push(*turned));
                 let rest = bend.push(0.0) - jacobian.bias(&dq);
-                let ddq = jacobian.joint_speed(&rest).ok_or(singular)?;
+                let ddq = jacobian.joint_speed_undamped(&rest);
                 Ok(PathPoint { q, dq, ddq })
             }
         }

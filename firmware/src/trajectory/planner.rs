@@ -31,7 +31,7 @@ use protocol::messages::{Refusal, RefusalReason};
 
 use super::curve::MOST_PARTS;
 use super::path::{Path, PathPoint};
-use super::profile::{Bounds, HalfBounds, SCurve};
+use super::profile::{Bounds, HalfBounds, SCurve, Sample};
 use super::request::{Request, Target, from_path};
 use super::torque_budget::TorqueBudget;
 use super::{Reference, Trajectory};
@@ -39,7 +39,7 @@ use crate::mechanics::arm::ArmModel;
 use crate::mechanics::body::Torques;
 use blend::Blend;
 use jump::{Chamfer, Jump};
-use survey::{Apex, fill};
+use survey::Apex;
 use verify::Pass;
 
 /// Corrections of the accelerations.
@@ -97,6 +97,14 @@ enum Stage {
         round: u8,
         point: u8,
         /// New accelerations of the half, next to rest and next to the peak speed.
+        wanted: [f32; 2],
+    },
+    /// Its motion is known.
+    Weigh {
+        here: PathPoint,
+        along: Sample,
+        round: u8,
+        point: u8,
         wanted: [f32; 2],
     },
     /// How much higher than asked for one stroke of a jump should go.
@@ -159,9 +167,9 @@ impl Planner {
     /// Number of calls of [`Planner::work`] after which a plan is complete or refused.
     pub const MAX_STEPS: u32 = {
         let locate = 2;
-        let survey = MOST_PARTS as u32 + 1 + cruise::PLACES as u32 + 3;
+        let survey = MOST_PARTS as u32 + 2 + cruise::PLACES as u32 + 3;
         let compose = ROUNDS as u32 + 1;
-        let balance = 2 * (ROUNDS as u32 * ENDS as u32 + 1);
+        let balance = 4 * (ROUNDS as u32 * ENDS as u32 + 1);
         // Its ends, its apex, and the borders of the travel's segments; motion, torques and scale. A jump has fewer steps than an arc, and the borders of
         // its strokes.
         let verify = 3 * (2 * MOST_PARTS as u32 + 3 + 12);
@@ -279,6 +287,16 @@ impl Planner {
                 point,
                 wanted,
             } => self.balance(budget, round, point, wanted),
+            Stage::Weigh {
+                here,
+                along,
+                round,
+                point,
+                wanted,
+            } => {
+                self.weigh(budget, (&here, &along), round, point, wanted);
+                Ok(())
+            }
             Stage::Verify => self.verify(budget),
             Stage::Load { t, reference } => {
                 self.load(budget, t, &reference);
@@ -351,45 +369,6 @@ impl Planner {
 
     fn point(&self, arm: &ArmModel, s: f32) -> Result<PathPoint, Refusal> {
         self.draft.path.at(arm, s).map_err(from_path)
-    }
-
-    /// Profile from the bounds.
-    #[inline(never)]
-    fn compose(&mut self, arm: &ArmModel, round: u8) {
-        let travels = self.bounds.speed > 0.0;
-        if travels {
-            // The joint acceleration limits as a limit along the path. They vary along a curve of the tool: left to the last pass.
-            if let Path::Joint { delta, .. } = &self.draft.path {
-                let ceiling = fill(&arm.limits.acceleration, delta);
-                let Bounds {
-                    accelerate, brake, ..
-                } = &mut self.bounds;
-                for acceleration in [
-                    &mut accelerate.slow,
-                    &mut accelerate.fast,
-                    &mut brake.slow,
-                    &mut brake.fast,
-                ] {
-                    *acceleration = acceleration.min(ceiling);
-                }
-            }
-            self.draft.profile = SCurve::new(1.0, &self.bounds);
-        }
-        self.draft.span = self.draft.profile.duration();
-        if travels && round < ROUNDS {
-            self.stage = Stage::Balance {
-                round,
-                point: 0,
-                wanted: [0.0; 2],
-            };
-        } else if self.jump.is_some() {
-            self.stage = Stage::Raise { down: false };
-        } else {
-            if self.draft.path.is_arc() {
-                self.apex = self.draft.profile.time_at(self.apex);
-            }
-            self.begin_pass();
-        }
     }
 }
 

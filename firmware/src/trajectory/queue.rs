@@ -63,6 +63,8 @@ pub struct MoveQueue {
     held: Option<bool>,
     /// Whether the last sample followed a curve of the tool, which makes it expensive.
     pub(crate) followed_curve: bool,
+    /// Whether it followed two moves, which makes it more so.
+    followed_two: bool,
     /// Where the last planned move ends: the next one starts there.
     plan_end: Vector4<f32>,
     completed: u8,
@@ -82,6 +84,7 @@ impl MoveQueue {
             cool: 1.0,
             held: None,
             followed_curve: false,
+            followed_two: false,
             plan_end: Vector4::zeros(),
             completed: 0,
         }
@@ -186,8 +189,7 @@ impl MoveQueue {
 
     /// Whether two moves are under way, which makes a sample expensive.
     pub fn is_blending(&self) -> bool {
-        let first = self.moves.front();
-        first.is_some_and(|first| first.overlap > 0.0 && self.now > first.next_begins())
+        self.followed_two
     }
 
     /// Takes a request.
@@ -215,6 +217,7 @@ impl MoveQueue {
         }
         self.clock = Clock::new(self.pace());
         self.now = 0.0;
+        self.followed_two = false;
         self.plan_end = *q;
     }
 
@@ -223,17 +226,22 @@ impl MoveQueue {
         self.is_busy() || !(self.requests.is_empty() || self.moves.is_full())
     }
 
+    /// Instructions that the next step of planning takes at the most.
+    pub(crate) fn planning_cost(&self) -> u16 {
+        self.planner.cost()
+    }
+
     /// A step of planning, and more as long as all of them take at most `room` instructions. Returns an answer once there is one.
     pub fn plan(&mut self, budget: &TorqueBudget<'_>, room: u16) -> Option<Answer> {
         let mut taken = 0_u16;
         loop {
-            let after = taken.saturating_add(self.planner.cost());
-            if taken > 0 && after > room {
-                return None;
+            // Without room for more than one, what that takes does not matter.
+            if room > 0 {
+                taken = taken.saturating_add(self.planner.cost());
             }
-            taken = after;
             let answer = self.step(budget);
-            if answer.is_some() || self.planner.is_idle() {
+            let is_full = taken >= room || taken.saturating_add(self.planner.cost()) > room;
+            if answer.is_some() || is_full || self.planner.is_idle() {
                 return answer;
             }
         }
@@ -333,8 +341,8 @@ impl MoveQueue {
         let ahead = self.clock.lead(lead);
         let mut followed = trajectory.follow(budget.arm, t, ahead, setpoint);
         let since = t - trajectory.next_begins();
-        if trajectory.overlap > 0.0
-            && since + ahead > 0.0
+        self.followed_two = trajectory.overlap > 0.0 && since + ahead > 0.0;
+        if self.followed_two
             && let Some(next) = self.moves.get(1)
         {
             followed =
@@ -376,19 +384,10 @@ impl MoveQueue {
     /// The next change of the pace.
     #[inline(never)]
     fn ramp(&mut self, budget: &TorqueBudget<'_>, stride: &Stride, setpoint: &Setpoint) {
-        // The torque is that of the instant in which the command acts.
-        let then = Reference {
-            q: setpoint.reference.q,
-            qd: setpoint.ahead.qd,
-            qdd: setpoint.ahead.qdd,
-        };
         let soon = stride.stopping || self.found < self.asked || self.held == Some(false);
         let share = if soon { STOP_SHARE } else { RAMP_SHARE };
-        let mut ramp = budget.ramp(&then, self.clock.time_scale(), share);
-        if stride.stopping {
-            ramp.faster = 0.0;
-        }
-        self.clock.ramp(&ramp, stride.period);
+        let (period, stopping) = (stride.period, stride.stopping);
+        self.clock.ramp(budget, setpoint, share, period, stopping);
     }
 }
 

@@ -3,9 +3,9 @@
 use nalgebra::Vector4;
 use protocol::messages::{Refusal, RefusalReason};
 
-use super::Reference;
 use super::path::PathPoint;
 use super::profile::{Bounds, HalfBounds, Sample};
+use super::{Rates, Reference};
 use crate::mechanics::arm::{ArmModel, Axis};
 use crate::mechanics::body::{Body, Torques};
 use crate::mechanics::dynamics::lagrange::Couplings;
@@ -40,17 +40,6 @@ pub struct Need {
     rest: Torques,
 }
 
-/// How fast a trajectory may change its time scale.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ramp {
-    /// Greatest decrease of the time scale, 1/s.
-    pub slower: f32,
-    /// Greatest increase, 1/s.
-    pub faster: f32,
-    /// Greatest change of the slope, 1/s²; infinite at rest.
-    pub bend: f32,
-}
-
 impl TorqueBudget<'_> {
     /// The acceleration along the path, 1/s², and the jerk, 1/s³, that the torques and their rates of change allow an arm at rest.
     pub fn from_rest(&self, here: &PathPoint) -> (f32, f32) {
@@ -59,7 +48,7 @@ impl TorqueBudget<'_> {
             push: self.torques(&push),
             rest: self.torques(&self.body.lagrange.gravity()),
         };
-        (self.rooms(&need).1, self.quickest(&need))
+        (self.room(&need, true), self.quickest(&need))
     }
 
     /// By what factor the path acceleration of `along` could grow before the first torque
@@ -69,10 +58,11 @@ impl TorqueBudget<'_> {
         let couplings = self.couplings(&here.q);
         let push = self.torques(&self.body.inertial(&couplings, &(here.dq * a)));
         let rest = self.load(&couplings, &(here.dq * v), &(here.ddq * (v * v)));
-        // Not by `rooms`, which looks both ways: it costs 190 instructions more in what is the dearest step of planning.
+        // Unlike `room` it looks over what hardly pushes.
         let limits = &self.body.planned_torque;
         let mut room = f32::MAX;
-        for ((push, rest), limit) in push.iter().zip(rest.iter()).zip(limits.iter()) {
+        let each = push.as_slice().iter().zip(rest.as_slice());
+        for ((push, rest), limit) in each.zip(limits.as_slice()) {
             let left = if *push < 0.0 {
                 limit + rest
             } else {
@@ -89,42 +79,45 @@ impl TorqueBudget<'_> {
 
     /// How fast the motors can change the acceleration along the path, 1/s³; infinite where nothing moves.
     fn quickest(&self, need: &Need) -> f32 {
-        let each = need.push.iter().zip(self.body.torque_rate.iter());
+        let each = need
+            .push
+            .as_slice()
+            .iter()
+            .zip(self.body.torque_rate.as_slice());
         each.fold(f32::INFINITY, |quickest, (push, rate)| {
             slower(quickest, RATE_SHARE * rate, *push)
         })
     }
 
-    /// How fast the clock that runs through a trajectory at `time_scale` may be braked or sped up before the first torque reaches
-    /// its share, with this share of the torques' rates. `reference` is the trajectory's own. With a load on the lift the two
-    /// directions differ: its weight brakes a rise, and takes most of the force on the way down.
-    pub fn ramp(&self, reference: &Reference, time_scale: f32, share: f32) -> Ramp {
-        let rest = Reference {
-            q: reference.q,
-            qd: reference.qd * time_scale,
-            qdd: reference.qdd * (time_scale * time_scale),
-        };
-        let need = self.split(&rest, &reference.qd);
-        let (slower, faster) = self.rooms(&need);
-        let mut ramp = Ramp {
-            slower,
-            faster,
-            bend: share * self.quickest(&need),
-        };
-        if self.arm.limits.caps_acceleration() {
-            self.cap_ramp(&rest, &reference.qd, share, &mut ramp);
+    /// What it takes to brake or speed up the clock that runs at `time_scale` through a trajectory, whose own motion at `q` is `rates`.
+    #[inline(never)]
+    pub fn need(&self, q: &Vector4<f32>, rates: &Rates, time_scale: f32) -> Need {
+        let couplings = self.couplings(q);
+        let (qd, qdd) = (rates.qd * time_scale, rates.qdd * (time_scale * time_scale));
+        Need {
+            push: self.torques(&self.body.inertial(&couplings, &rates.qd)),
+            rest: self.load(&couplings, &qd, &qdd),
         }
-        ramp
     }
 
-    /// The torques for the motion `rest`, and for the accelerations `push` apart from it.
-    // Out of line, for the size of two copies.
-    #[inline(never)]
-    fn split(&self, rest: &Reference, push: &Vector4<f32>) -> Need {
-        let couplings = self.couplings(&rest.q);
-        Need {
-            push: self.torques(&self.body.inertial(&couplings, push)),
-            rest: self.load(&couplings, &rest.qd, &rest.qdd),
+    /// Greatest change of the slope of the time scale, 1/s², with this share of the torques' rates; infinite at rest.
+    pub fn bend(&self, need: &Need, rates: &Rates, share: f32) -> f32 {
+        let bend = share * self.quickest(need);
+        if self.arm.limits.caps_acceleration() {
+            self.cap_bend(rates, share, bend)
+        } else {
+            bend
+        }
+    }
+
+    /// How fast the time scale may fall, or rise where it gets `faster`, before the first torque reaches its share, 1/s. With a load on the lift
+    /// the two differ: its weight brakes a rise, and takes most of the force on the way down.
+    pub fn steepest(&self, need: &Need, rates: &Rates, time_scale: f32, faster: bool) -> f32 {
+        let steepest = self.room(need, faster);
+        if self.arm.limits.caps_acceleration() {
+            self.cap_slope(rates, time_scale, faster, steepest)
+        } else {
+            steepest
         }
     }
 
@@ -148,23 +141,22 @@ impl TorqueBudget<'_> {
         self.body.frictionless(couplings, qd, qdd) + viscous
     }
 
-    /// How far `push` may go down and up from none before it and `rest` together need more than their share of a torque.
+    /// How far `push` may go down from none, or up, before it and `rest` together need more than their share of a torque.
     // Out of line, for the size of one copy.
     #[inline(never)]
-    fn rooms(&self, need: &Need) -> (f32, f32) {
+    fn room(&self, need: &Need, up: bool) -> f32 {
         let limits = &self.body.planned_torque;
-        let (mut down, mut up) = (f32::MAX, f32::MAX);
-        for ((push, rest), limit) in need.push.iter().zip(need.rest.iter()).zip(limits.iter()) {
-            let (low, high) = (limit + rest, limit - rest);
-            let (low, high) = if *push < 0.0 {
-                (high, low)
+        let mut room = f32::MAX;
+        let each = need.push.as_slice().iter().zip(need.rest.as_slice());
+        for ((push, rest), limit) in each.zip(limits.as_slice()) {
+            let left = if (*push < 0.0) == up {
+                limit + rest
             } else {
-                (low, high)
+                limit - rest
             };
-            down = slower(down, low.max(0.0), *push);
-            up = slower(up, high.max(0.0), *push);
+            room = slower(room, left.max(0.0), *push);
         }
-        (down, up)
+        room
     }
 
     /// Whether the arm can creep: hold its weight and overcome friction in either direction with torque to spare.
@@ -182,7 +174,8 @@ impl TorqueBudget<'_> {
                 limit,
             })
         };
-        for ((axis, value), limit) in Axis::ALL.into_iter().zip(torque.iter()).zip(limits.iter()) {
+        let each = Axis::ALL.into_iter().zip(torque.as_slice());
+        for ((axis, value), limit) in each.zip(limits.as_slice()) {
             if value >= limit {
                 return refuse(axis, *value, *limit);
             }
@@ -234,7 +227,8 @@ impl TorqueBudget<'_> {
         let a = torque - b - c;
         let limits = &self.body.planned_torque;
         let mut scale = 1.0f32;
-        for (((a, b), c), limit) in a.iter().zip(b.iter()).zip(c.iter()).zip(limits.iter()) {
+        let each = a.as_slice().iter().zip(b.as_slice()).zip(c.as_slice());
+        for (((a, b), c), limit) in each.zip(limits.as_slice()) {
             scale = least(scale, scale_within(*a, *b, *c, *limit));
         }
         scale
@@ -353,8 +347,9 @@ pub(super) fn slower(fastest: f32, rate: f32, push: f32) -> f32 {
 
 fn within(value: &Torques, limit: &Torques) -> bool {
     value
+        .as_slice()
         .iter()
-        .zip(limit.iter())
+        .zip(limit.as_slice())
         .all(|(value, limit)| value.abs() <= *limit)
 }
 

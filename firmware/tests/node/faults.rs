@@ -301,7 +301,7 @@ fn every_cause_of_the_table_is_raised_and_reported_in_words() {
             Cause::EncoderFault => format!("encoder fault: {up}"),
             Cause::Collision => "collision, axis 3 (lift): 1874.9 N, limit 430.0 N".into(),
             Cause::Chatter => "chatter, axis 2 (elbow): 81 %, limit 80 %".into(),
-            Cause::Overload => "overload, axis 3 (lift): 120.01 %, limit 120.00 %".into(),
+            Cause::Overload => "overload, axis 3 (lift): 120.3 %, limit 120.0 %".into(),
             _ => String::new(),
         };
         assert_eq!(state.fault().to_string(), expected);

@@ -339,7 +339,7 @@ impl Stage {
         self.before = q;
         self.control = actions.control;
         self.motor_torque = actions.torque.into();
-        self.controller.plan();
+        self.controller.plan(0);
         self.samples += 1;
         self.measure();
     }

@@ -108,7 +108,12 @@ impl Controller {
         let inward = |((q, qd), (lower, upper)): ((&f32, &f32), (&f32, &f32))| {
             !(q > upper && *qd > 0.0 || q < lower && *qd < 0.0)
         };
-        let limits = limits.lower.iter().zip(limits.upper.iter());
-        self.operation == Operation::Manual && q.iter().zip(qd.iter()).zip(limits).all(inward)
+        let limits = limits.lower.as_slice().iter().zip(limits.upper.as_slice());
+        self.operation == Operation::Manual
+            && q.as_slice()
+                .iter()
+                .zip(qd.as_slice())
+                .zip(limits)
+                .all(inward)
     }
 }

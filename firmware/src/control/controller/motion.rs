@@ -26,9 +26,10 @@ impl Controller {
         }
     }
 
-    /// Continues planning: for each millisecond of the sampling period a step, and what else there is room for. Kept out of the path from
+    /// Continues planning: for each millisecond of the sampling period a step, and what else there is room for, in a sample that has `spent` so many
+    /// instructions of it on something else. Kept out of the path from
     /// measurement to command, which it would delay. Returns whether there was anything to plan.
-    pub fn plan(&mut self) -> bool {
+    pub fn plan(&mut self, spent: u16) -> bool {
         // Where a stop will end is not known before; and a sample that changes the pace, or follows two moves, has no time to plan.
         let busy = self.state.is_stopping() || self.queue.is_ramping() || self.queue.is_blending();
         if !self.state.is_powered() || busy || !self.queue.has_to_plan() {
@@ -38,7 +39,10 @@ impl Controller {
             arm: &self.arm,
             body: &self.body,
         };
-        let room = self.planning_room();
+        let room = self.planning_room().saturating_sub(spent);
+        if spent > 0 && self.queue.planning_cost() > room {
+            return true;
+        }
         for _ in 0..self.planning_turns {
             match self.queue.plan(&budget, room) {
                 None => {}

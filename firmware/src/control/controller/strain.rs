@@ -29,6 +29,10 @@ const SLOW: f32 = 0.1;
 /// Samples of which one has a look at axes that stand.
 const STANCE_SAMPLES: u32 = 10;
 
+/// Samples of which one accounts for heat and burden, and the instructions of a Cortex-M4F that it takes for that.
+const ACCOUNT_SAMPLES: u32 = 10;
+const ACCOUNT: u16 = 300;
+
 /// A torque that swings from limit to limit, %, as [`Chatter`](crate::control::chatter::Chatter) counts it.
 const FULL_SWING: f32 = 400.0;
 
@@ -42,8 +46,8 @@ impl Controller {
         }
         // More than this where the motor of the wrist has to turn lift and wrist, which neither shows by itself.
         let (mut needed, mut speeds_up) = (1.0, false);
-        let limits = self.body.torque_limit.iter();
-        for ((torque, qd), limit) in torque.iter().zip(qd.iter()).zip(limits) {
+        let limits = self.body.torque_limit.as_slice();
+        for ((torque, qd), limit) in torque.as_slice().iter().zip(qd.as_slice()).zip(limits) {
             let share = torque.abs() / limit;
             if share > needed {
                 (needed, speeds_up) = (share, torque * qd > 0.0);
@@ -111,10 +115,8 @@ impl Controller {
         excess != 0.0 && readings.is_still(axis) && pull >= PULLS * told
     }
 
-    /// What need not be done in every sample. Looks for chatter, and accounts for the heat of the motors: too much of it slows down the moves
-    /// that begin from now on, and what that does not cool stops the arm. Weighs what the lift carries.
-    /// It stands for `samples` samples.
-    pub fn tend(&mut self, samples: u32) {
+    /// Looks for chatter, which need not be done in every sample.
+    pub fn look(&mut self) {
         let period = self.period;
         let limit = &self.arm.drive.motor_torque_limit;
         let rise = &self.arm.limits.effort_rise_time;
@@ -122,7 +124,13 @@ impl Controller {
             let limit = f32::from(CHATTER_PERCENT);
             self.blame(axis, Cause::Chatter, percent, limit);
         }
-        let part = samples as f32 * period / self.setup.thermal_time;
+    }
+
+    /// Nor this, which stands for `samples` samples: accounts for the heat of the motors, too much of which slows down the moves that begin from
+    /// now on, and what that does not cool stops the arm; and weighs what the lift carries.
+    fn account(&mut self, samples: u32) {
+        let time = samples as f32 * self.period;
+        let part = time / self.setup.thermal_time;
         // Of each motor by itself.
         let continuous = (self.arm.limits.effort_continuous)
             .component_div(&self.body.drive.own_torque(&Vector4::repeat(1.0)));
@@ -138,7 +146,6 @@ impl Controller {
         }
         self.queue.set_cool_pace(pace);
         if self.state.is_powered() && !self.state.is_braking() {
-            let time = samples as f32 * period;
             let gravity = self.arm.gravity;
             let heavier = 1.0 - self.setpoint.reference.qdd.z / gravity;
             let pull = self.observer.residual().z;
@@ -152,7 +159,13 @@ impl Controller {
         let is_manual = self.operation == Operation::Manual;
         let is_turn = samples % if is_manual { 2 } else { STANCE_SAMPLES } == 1;
         let is_first = is_manual && is_turn && self.state == State::Moving;
-        let planned = !is_first && self.plan();
+        let spent = if samples % ACCOUNT_SAMPLES == ACCOUNT_SAMPLES / 2 {
+            self.account(ACCOUNT_SAMPLES);
+            ACCOUNT
+        } else {
+            0
+        };
+        let planned = !is_first && self.plan(spent);
         if !planned && (is_manual || is_turn) {
             self.watch_stance(readings);
         }

@@ -7,7 +7,7 @@ use nalgebra::Vector4;
 
 use super::Pose;
 use crate::mechanics::arm::{ArmModel, Axis, Geometry, JointLimits};
-use crate::mechanics::math::{atan2, clamp, hypot, sin_cos, sqrt, wrap};
+use crate::mechanics::math::{angle, atan2, clamp, greatest, hypot, sin_cos, sqrt, wrap};
 
 /// How far out of reach a radius may be and still count as on the boundary, as a fraction of the stretched arm: 8 u,
 /// half a micrometre per metre.
@@ -146,6 +146,75 @@ pub fn solve(geometry: &Geometry, pose: &Pose, elbow: Elbow) -> Result<Vector4<f
         geometry.d1 - geometry.d4 - z,
         theta4,
     ))
+}
+
+/// Shoulder and elbow for a place of the flange, with the sines and cosines that they have there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Planar {
+    /// theta1 in (-pi, pi] (rad).
+    pub(crate) theta1: f32,
+    /// theta2, likewise.
+    pub(crate) theta2: f32,
+    /// sin theta1 and cos theta1.
+    pub(crate) shoulder: (f32, f32),
+    /// sin theta2.
+    pub(crate) s2: f32,
+}
+
+/// As [`solve`] for the places along a curve, of which every sample asks for one: sines and cosines follow from the triangle of base, elbow and
+/// flange, and each angle from its own. That is a third of the work of going from the angles to them.
+///
+/// With r the radius, S and D as above, S^2 - r^2 and r^2 - D^2 are 4 a1 a2 times the squares of sine and cosine of theta2 / 2.
+///
+/// # Errors
+///
+/// As [`solve`]; theta1 is not a number where the radius is zero.
+#[inline(always)]
+pub(crate) fn planar(
+    geometry: &Geometry,
+    (x, y): (f32, f32),
+    elbow: Elbow,
+) -> Result<Planar, IkError> {
+    let Geometry { a1, a2, .. } = *geometry;
+    let square = x * x + y * y;
+    let (max, min) = (a1 + a2, a1 - a2);
+    let stretched = max * max - square;
+    let folded = square - min * min;
+    let slack = 2.0 * REACH_TOLERANCE * max * max;
+    if !(stretched > -slack && folded > -slack) {
+        return Err(out_of_reach(square, max, min.abs()));
+    }
+    // The tolerance may leave either below zero.
+    let product = greatest(stretched, 0.0) * greatest(folded, 0.0);
+    let scale = 0.5 / (a1 * a2);
+    let sine = sqrt(product) * scale;
+    let s2 = match elbow {
+        Elbow::Positive => sine,
+        Elbow::Negative => -sine,
+    };
+    let c2 = (folded - stretched) * (0.5 * scale);
+    let (along, across) = (a1 + a2 * c2, a2 * s2);
+    let (s1, c1) = (y * along - x * across, x * along + y * across);
+    let share = 1.0 / square;
+    Ok(Planar {
+        theta1: angle(s1, c1),
+        theta2: angle(s2, c2),
+        shoulder: (s1 * share, c1 * share),
+        s2,
+    })
+}
+
+// Out of line: no sample of a move comes here.
+#[inline(never)]
+fn out_of_reach(square: f32, max: f32, min: f32) -> IkError {
+    let radius = sqrt(square);
+    if radius > max {
+        IkError::TooFar { radius, max }
+    } else if radius < min {
+        IkError::TooNear { radius, min }
+    } else {
+        IkError::NotFinite
+    }
 }
 
 /// Joint position for `pose` within the limits of `arm`, with the wrist turn nearest to that of `near`.

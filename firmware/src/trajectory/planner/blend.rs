@@ -16,13 +16,13 @@
 //! at the same time they may need too high a rate, and none where one does before the other. So shorter ones follow until one keeps
 //! them; none is as good as a stop at the corner.
 
-use nalgebra::Vector4;
+use nalgebra::{Vector3, Vector4};
 
 use super::verify::Before;
 use super::{Planner, Stage};
 use crate::mechanics::arm::Geometry;
 use crate::mechanics::jacobian::Jacobian;
-use crate::mechanics::kinematics::{self, Trig};
+use crate::mechanics::kinematics::{self, Pose, Trig};
 use crate::mechanics::math::{least, sqrt};
 use crate::trajectory::path::{Path, check_limits};
 use crate::trajectory::tool_speed::{self, PLANNED};
@@ -203,9 +203,16 @@ impl Blend {
             Motion::First(reference) => {
                 let mut setpoint = Setpoint::rest(reference.q);
                 setpoint.reference = reference;
-                if first.add(next, arm, t, 0.0, &mut setpoint).is_err()
-                    || distance(&arm.geometry, &setpoint.reference.q, &first.end) > first.zone
-                {
+                if first.add(next, arm, t, 0.0, &mut setpoint).is_err() {
+                    return Some(false);
+                }
+                // Where the next move is a curve it begins there.
+                let corner = match &next.path {
+                    Path::Joint { .. } => flange(&arm.geometry, &first.end),
+                    Path::Tool { curve, .. } => curve.start(),
+                };
+                let off = flange(&arm.geometry, &setpoint.reference.q) - corner;
+                if sqrt(off.dot(&off)) > first.zone {
                     return Some(false);
                 }
                 self.motion = Motion::Both(setpoint.reference);
@@ -267,13 +274,11 @@ fn most_tool_speed(first: &Trajectory, next: &Trajectory) -> f32 {
     }
 }
 
-/// Distance of the flange from that of other joint positions, m.
+/// Position of the flange, m.
 #[inline(never)]
-fn distance(geometry: &Geometry, q: &Vector4<f32>, corner: &Vector4<f32>) -> f32 {
-    let here = kinematics::forward(geometry, q);
-    let there = kinematics::forward(geometry, corner);
-    let offset = Vector4::new(here.x - there.x, here.y - there.y, here.z - there.z, 0.0);
-    sqrt(offset.dot(&offset))
+fn flange(geometry: &Geometry, q: &Vector4<f32>) -> Vector3<f32> {
+    let Pose { x, y, z, .. } = kinematics::forward(geometry, q);
+    Vector3::new(x, y, z)
 }
 
 impl Trajectory {

@@ -4,12 +4,14 @@ use super::{Planner, Stage};
 use crate::trajectory::path::Path;
 use crate::trajectory::request::Target;
 
-/// Of a step that leaves no room for another one.
-const ALONE: u16 = u16::MAX;
+/// Of a step that leaves no room for another one; none takes more.
+const ALONE: u16 = 1_400;
 
 impl Planner {
     /// Instructions of a Cortex-M4F that the next step takes at the most. They are stated here, and not measured while it runs: whatever
     /// the machine, the same samples take the same steps.
+    // Out of line, for the size of one copy.
+    #[inline(never)]
     pub(in crate::trajectory) fn cost(&self) -> u16 {
         let straight = matches!(self.draft.path, Path::Joint { .. });
         match &self.stage {
@@ -20,7 +22,7 @@ impl Planner {
                 ..
             } => 550,
             // Curves of the tool: each of their steps solves for the joints.
-            Stage::Locate { .. } | Stage::Blend(_) => ALONE,
+            Stage::Locate { .. } | Stage::Blend(_) | Stage::Weigh { .. } => ALONE,
             _ if !straight => ALONE,
             Stage::Survey { point: 0, .. } => 470,
             Stage::Survey { .. } => 730,

@@ -39,7 +39,8 @@ impl Apex {
 }
 
 impl Planner {
-    /// Reach, limits and the largest joint travel per unit of path.
+    /// Reach, limits and the largest joint travel per unit of path; after the last point the bounds that follow from it, of an arc in a step of
+    /// their own.
     #[inline(never)]
     pub(super) fn survey(
         &mut self,
@@ -53,6 +54,10 @@ impl Planner {
             Path::Joint { .. } => (1, None),
             Path::Tool { curve, .. } => (curve.parts(), Some(curve)),
         };
+        if point > points {
+            self.bound(budget, &fastest, apex);
+            return Ok(());
+        }
         let count = f32::from(points);
         let mut s = f32::from(point) / count;
         // Where it comes nearest to the base the arm is bent most, and where it goes farthest least: the point between the ends next to
@@ -79,7 +84,7 @@ impl Planner {
         if point == 0 {
             budget.check_creep()?;
         }
-        if point < points {
+        if point < points || self.draft.path.is_arc() {
             self.stage = Stage::Survey {
                 point: point + 1,
                 fastest,
@@ -87,12 +92,18 @@ impl Planner {
             };
             return Ok(());
         }
-        let mut speed = fill(&budget.speed(), &fastest);
+        self.bound(budget, &fastest, apex);
+        Ok(())
+    }
+
+    /// Bounds of the motion along the path.
+    fn bound(&mut self, budget: &TorqueBudget<'_>, fastest: &Vector4<f32>, apex: Apex) {
+        let mut speed = fill(&budget.speed(), fastest);
         if speed == f32::MAX {
             // Nothing moves along the path: at most the lift of a jump does.
             self.bounds.speed = 0.0;
             self.stage = Stage::Compose { round: ROUNDS };
-            return Ok(());
+            return;
         }
         if self.slow_tool {
             let part = if self.jump.is_some() { OF_A_PART } else { 1.0 };
@@ -108,8 +119,8 @@ impl Planner {
         // Of a robot that has such limits.
         let limits = &budget.arm.limits;
         let quickest = RAMPS * speed;
-        let acceleration = fill(&limits.acceleration, &fastest).min(speed * quickest);
-        let jerk = fill(&limits.jerk, &fastest).min(speed * quickest * quickest);
+        let acceleration = fill(&limits.acceleration, fastest).min(speed * quickest);
+        let jerk = fill(&limits.jerk, fastest).min(speed * quickest * quickest);
         let half = HalfBounds::even(acceleration, jerk);
         self.bounds = Bounds {
             speed,
@@ -123,7 +134,6 @@ impl Planner {
         } else {
             Stage::Rest { place: 0 }
         };
-        Ok(())
     }
 
     /// What the torques and their rates allow an arm at rest at the beginning, in the middle and at the end of the path: the jerk
@@ -159,7 +169,11 @@ impl Planner {
 /// through its position there.
 fn farthest(here: &PathPoint, s: f32, reach: f32) -> Vector4<f32> {
     let mut farthest = here.q;
-    for (q, (dq, ddq)) in farthest.iter_mut().zip(here.dq.iter().zip(here.ddq.iter())) {
+    for (q, (dq, ddq)) in farthest
+        .as_mut_slice()
+        .iter_mut()
+        .zip(here.dq.as_slice().iter().zip(here.ddq.as_slice()))
+    {
         let ahead = -dq / ddq;
         if ahead.abs() < reach && ahead > -s && ahead < 1.0 - s {
             *q += 0.5 * dq * ahead;
@@ -174,8 +188,9 @@ fn farthest(here: &PathPoint, s: f32, reach: f32) -> Vector4<f32> {
 #[inline(never)]
 pub(super) fn fill(limit: &Vector4<f32>, travel: &Vector4<f32>) -> f32 {
     limit
+        .as_slice()
         .iter()
-        .zip(travel.iter())
+        .zip(travel.as_slice())
         .filter(|(_, travel)| travel.abs() > NO_TRAVEL)
         .map(|(limit, travel)| limit / travel.abs())
         .fold(f32::MAX, f32::min)
