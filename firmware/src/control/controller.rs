@@ -125,8 +125,6 @@ pub struct Controller {
     missed: u32,
     /// Samples in a row in which an encoder did not move with its axis at its torque limit, those off the reference several times.
     stuck: u32,
-    /// Motor velocities in the last of them, rad/s.
-    strained: Vector4<f32>,
     /// What the last sample followed, as handed to the law.
     setpoint: Setpoint,
     memory: Memory,
@@ -137,8 +135,8 @@ pub struct Controller {
     chatter: Chatter,
     excess: Vector4<f32>,
     error: Vector4<f32>,
-    /// Velocities measured in the last sample.
-    last_qd: Vector4<f32>,
+    /// Motor velocities in the last sample, rad/s.
+    last_velocity: Vector4<f32>,
     arm: ArmModel,
     replies: Deque<MotionReply, { 2 * CAPACITY }>,
     unanswered: u16,
@@ -179,7 +177,6 @@ impl Controller {
             drives_on: false,
             saturated: 0,
             stuck: 0,
-            strained: Vector4::zeros(),
             missed: 0,
             queue: MoveQueue::new(),
             setpoint: Setpoint::rest(Vector4::zeros()),
@@ -192,7 +189,7 @@ impl Controller {
             stance: Stance::new(),
             excess: Vector4::zeros(),
             error: Vector4::zeros(),
-            last_qd: Vector4::zeros(),
+            last_velocity: Vector4::zeros(),
             replies: Deque::new(),
             unanswered: 0,
             alarms: [None; 3],
@@ -233,7 +230,7 @@ impl Controller {
             self.setpoint = Setpoint::rest(q);
             self.is_placed = true;
             self.queue.clear(&q);
-            self.last_qd = qd;
+            self.last_velocity = readings.velocity;
             self.error = Vector4::zeros();
             self.excess = Vector4::zeros();
             self.saturated = 0;
@@ -289,7 +286,8 @@ impl Controller {
         if let Some(axis) = self.monitor.feels(felt)
             && !self.limp
         {
-            let numbers = [&motion.qd, &self.last_qd, felt, &self.error, &reference.qd];
+            let last_qd = self.last_qd();
+            let numbers = [&motion.qd, &last_qd, felt, &self.error, &reference.qd];
             let felt = self.monitor.felt(axis, readings, numbers);
             if felt != Felt::Nothing {
                 return self.react(felt);
@@ -304,7 +302,6 @@ impl Controller {
         probe.end(Phase::Observer);
         let limited = limits::cut(&self.arm, &self.body.drive, &torque);
         self.excess = limited.excess;
-        self.last_qd = qd;
         if limited.flags != LimitFlags::EMPTY {
             if !torque.iter().all(|torque| torque.is_finite()) {
                 // No finite input leads here; should it happen, close the brake.
@@ -318,6 +315,7 @@ impl Controller {
         } else {
             self.stuck = 0;
         }
+        self.last_velocity = readings.velocity;
         self.chatter.keep(&limited.motor_torque);
         if self.operation == Operation::Manual {
             self.watch_tool(&q, &qd);
@@ -336,6 +334,13 @@ impl Controller {
             [0.0; 4]
         };
         Actions { control, torque }
+    }
+
+    /// Velocities measured in the last sample.
+    // Out of line, for the size of two copies.
+    #[inline(never)]
+    fn last_qd(&self) -> Vector4<f32> {
+        self.body.drive.joint_speed(&self.last_velocity)
     }
 
     /// What of these motor torques the drives may have: none for the arm where it has to be without; and from enabling on as much as builds up

@@ -26,10 +26,10 @@ pub struct Stance {
 #[derive(Clone, Copy, Debug)]
 struct Place {
     count: i32,
-    /// Magnitude of the effort then, N m, lift N.
+    /// Magnitude of the effort then, N m, lift N; while it moves, when it was looked at before the last time.
     effort: f32,
-    /// The same when it was last looked at twice, the older first: between the two an encoder may have got stuck in the middle of a sample.
-    last: [f32; 2],
+    /// The same when it was last looked at.
+    last: f32,
 }
 
 impl Stance {
@@ -37,8 +37,8 @@ impl Stance {
     pub fn new() -> Self {
         let nowhere = Place {
             count: i32::MAX,
-            effort: 0.0,
-            last: [f32::INFINITY; 2],
+            effort: f32::INFINITY,
+            last: f32::INFINITY,
         };
         Self {
             places: [nowhere; 4],
@@ -81,15 +81,14 @@ impl Place {
     ) -> f32 {
         let count = readings.counts.get(axis as usize).copied();
         let effort = axis.of(effort).abs();
-        let [older, newer] = self.last;
-        self.last = [newer, effort];
+        let last = core::mem::replace(&mut self.last, effort);
         let moves = axis.of(&readings.velocity) != 0.0;
         if moves || count != Some(self.count) {
-            let has_stopped = close && !moves;
-            self.effort = if has_stopped {
-                older.min(newer).min(effort)
-            } else {
-                effort
+            self.effort = match (close, moves) {
+                (false, _) => effort,
+                (true, true) => last,
+                // An encoder may have got stuck in the middle of the sample that was last looked at.
+                (true, false) => self.effort.min(last).min(effort),
             };
             self.count = count.unwrap_or_default();
             return 0.0;

@@ -70,8 +70,7 @@ impl Controller {
         let stuck = stills.into_iter().flatten().find(is_off);
         let stands = |axis: &Axis| axis.of(&excess) != 0.0 && axis.of(qd).abs() < axis.of(&slow);
 
-        let before = self.strained;
-        self.strained = readings.velocity;
+        let before = self.last_velocity;
         let turns = |axis: Axis| {
             let gained = axis.of(&(readings.velocity - before)) * axis.of(&excess).signum();
             readings.stays_still(axis, axis.of(&before)) && gained > TURNING * period

@@ -130,7 +130,8 @@ impl Controller {
         }
         // The reference of the last sample: at most one sample of motion older than `q`.
         let moved = self.setpoint.reference.qd * self.period;
-        let errors = [&(error + moved), &self.error, &self.last_qd];
+        let last_qd = self.last_qd();
+        let errors = [&(error + moved), &self.error, &last_qd];
         if let Some(fault) = self.monitor.check(readings, q, qd, errors)
             && !(fault.cause == Cause::SoftLimit && self.is_freed(q))
         {
