@@ -169,7 +169,7 @@ fn feedback_that_is_repeated_without_end_keeps_nobody_from_switching_off() {
     let mut scenario = Scenario::built_in("square").expect("it is built in");
     scenario.cycles = 1;
     // The last new one is that with which torque goes off.
-    let (summary, _) = run_of(scenario, &["feedback:ack-error@1211.8ms"], 0);
+    let (summary, _) = run_of(scenario, &["feedback:ack-error@1231.8ms"], 0);
     assert!(summary.completed, "{:?}", summary.error);
 }
 
