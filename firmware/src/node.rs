@@ -21,7 +21,7 @@ use protocol::messages::{
 };
 use protocol::time::{Duration, Instant};
 
-use crate::control::controller::{Config, Controller};
+use crate::control::controller::{Config, Controller, TURNS};
 use crate::control::fault::{FLOOD, PEER_TIMEOUT_MS};
 use crate::control::phase::{Phase, Probe};
 use crate::control::readings::Readings;
@@ -33,10 +33,7 @@ use peers::Pulse;
 pub const PEER_TIMEOUT: Duration = Duration::from_millis(PEER_TIMEOUT_MS as u64);
 /// Samples that a feedback can be ahead of the last one: the default of that age at the greatest rate, 10 kHz.
 const FARTHEST: u32 = 10 * PEER_TIMEOUT_MS;
-/// Planning pauses every tenth sample, for what need not be looked at more often, and so that no report waits longer: half the
-/// period of the state at 1 kHz, for a tenth of the planning. Counted in samples and not in time, so that the same feedback gives the same torques.
-const REPORT_SAMPLES: u32 = 10;
-/// Answers that may wait for such a sample; with more, reports are sent in spite of planning. Two leave room in the
+/// Answers that may wait for the sample in ten in which planning pauses; with more, reports are sent in spite of planning. Two leave room in the
 /// outbox for a request in every sample until then.
 const MAX_ANSWERS_WAITING: usize = 2;
 
@@ -303,12 +300,13 @@ impl Node {
         // Now that the command is on its way. By sample count and not by time, so that the same
         // feedback gives the same torques whenever it arrives.
         self.samples = self.samples.wrapping_add(1);
-        let planned = if self.samples.is_multiple_of(REPORT_SAMPLES) {
+        let turn = self.samples % TURNS;
+        let planned = if turn == 0 {
             self.listen(feedback.sample);
             self.controller.look();
             false
         } else {
-            self.controller.plan_or_watch(&readings, self.samples)
+            self.controller.plan_or_watch(&readings, turn)
         };
         probe.end(Phase::Planning);
         planned

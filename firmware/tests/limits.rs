@@ -125,11 +125,11 @@ fn a_limit_is_kept_where_it_is_reached() {
         });
         let error = limits.following_error;
         assert_eq!(
-            monitor.check(&moving, &furthest, &ZERO, [&error, &error, &ZERO]),
+            monitor.check(&moving, &furthest, &ZERO, [&error, &error], || ZERO),
             None
         );
         assert_eq!(
-            monitor.check(&moving, &middle(), &speed, [&error, &error, &speed]),
+            monitor.check(&moving, &middle(), &speed, [&error, &error], || speed),
             None
         );
     }
@@ -143,7 +143,7 @@ fn a_limit_that_is_reached_is_not_blamed() {
     at.z = 1.0;
     qd.z = IRB_930.limits.velocity.z * MonitorLimits::DEFAULT.speed_factor;
     let moving = readings(Vector4::repeat(10.0), ZERO);
-    let faults = [(); 3].map(|()| monitor.check(&moving, &at, &qd, [&ZERO, &ZERO, &qd]));
+    let faults = [(); 3].map(|()| monitor.check(&moving, &at, &qd, [&ZERO, &ZERO], || qd));
     let [None, None, Some(fault)] = faults else {
         panic!("{faults:?}");
     };
@@ -163,7 +163,7 @@ fn the_end_of_the_range_that_was_passed_is_named() {
         at.z = q;
         let still = readings(ZERO, ZERO);
         let faults: Vec<_> = (0..3)
-            .map(|_| monitor.check(&still, &at, &ZERO, [&ZERO, &ZERO, &ZERO]))
+            .map(|_| monitor.check(&still, &at, &ZERO, [&ZERO, &ZERO], || ZERO))
             .collect();
         let [None, None, Some(fault)] = faults[..] else {
             panic!("{faults:?}");
@@ -190,7 +190,7 @@ fn why(velocities: [f32; 3], qd: f32, error: f32) -> Fault {
     let faults = velocities.map(|velocity| {
         let velocity = Vector4::new(0.0, velocity, 0.0, 0.0);
         let readings = readings(velocity, Vector4::new(0.0, 1.0, 0.0, 0.0));
-        monitor.check(&readings, &middle(), &qd, [&error, &error, &qd])
+        monitor.check(&readings, &middle(), &qd, [&error, &error], || qd)
     });
     let [None, None, Some(fault)] = faults else {
         panic!("{faults:?}");

@@ -39,10 +39,12 @@ use crate::control::stance::Stance;
 use crate::control::states::State;
 use crate::mechanics::arm::ArmModel;
 use crate::mechanics::body::Body;
+use crate::mechanics::dynamics::drive::Drive;
 use crate::mechanics::math::clamp;
 use crate::trajectory::queue::{CAPACITY, MoveQueue};
 use crate::trajectory::{Reference, Setpoint};
 use requests::Answer;
+pub use strain::TURNS;
 
 /// How often per sample its room for planning is used, at the most: once for each millisecond of its period; below 100 Hz, planning is no
 /// faster than at 100 Hz.
@@ -286,7 +288,7 @@ impl Controller {
         if let Some(axis) = self.monitor.feels(felt)
             && !self.limp
         {
-            let last_qd = self.last_qd();
+            let last_qd = last_qd(&self.body.drive, &self.last_velocity);
             let numbers = [&motion.qd, &last_qd, felt, &self.error, &reference.qd];
             let felt = self.monitor.felt(axis, readings, numbers);
             if felt != Felt::Nothing {
@@ -336,13 +338,6 @@ impl Controller {
         Actions { control, torque }
     }
 
-    /// Velocities measured in the last sample.
-    // Out of line, for the size of two copies.
-    #[inline(never)]
-    fn last_qd(&self) -> Vector4<f32> {
-        self.body.drive.joint_speed(&self.last_velocity)
-    }
-
     /// What of these motor torques the drives may have: none for the arm where it has to be without; and from enabling on as much as builds up
     /// in half of the time of the brake, as a step of the load's weight would shake the arm.
     fn released(&mut self, torque: Vector4<f32>) -> Vector4<f32> {
@@ -367,6 +362,13 @@ impl Controller {
             self.unanswered = self.unanswered.saturating_add(1);
         }
     }
+}
+
+/// Joint velocities of a motor velocity.
+// Out of line, for the size of two copies that are rarely reached.
+#[inline(never)]
+fn last_qd(drive: &Drive, velocity: &Vector4<f32>) -> Vector4<f32> {
+    drive.joint_speed(velocity)
 }
 
 /// Torques of joints or motors without those of the arm.

@@ -148,14 +148,14 @@ impl Monitor {
         Some(Fault::value(cause, f32::from(status.bits()), 0.0))
     }
 
-    /// Judges one sample; `error` is reference minus measured position, and `before` that of the last sample, in which the velocity was
-    /// `last_qd`.
+    /// Judges one sample; `error` is reference minus measured position, `before` that of the last sample, and `last_qd` the velocity then.
     pub fn check(
         &mut self,
         readings: &Readings,
         q: &Vector4<f32>,
         qd: &Vector4<f32>,
-        [error, before, last_qd]: [&Vector4<f32>; 3],
+        [error, before]: [&Vector4<f32>; 2],
+        last_qd: impl FnOnce() -> Vector4<f32>,
     ) -> Option<Fault> {
         if is_within(error, &self.following_error)
             && is_within(qd, &self.speed)
@@ -164,7 +164,7 @@ impl Monitor {
             (self.following_count, self.speed_count, self.range_count) = (0, 0, 0);
             return None;
         }
-        self.trip(readings, [q, qd, last_qd, error, before])
+        self.trip(readings, [q, qd, &last_qd(), error, before])
     }
 
     /// Judges the axes of the shaft alone, by the same error, where the others are without torque.

@@ -19,7 +19,7 @@ impl Node {
             self.send(&Message::MotionReply(reply), bus);
         }
         // One that finds no room waits for it.
-        if let Some(alarm) = self.controller.alarm()
+        if let Some(alarm) = *self.controller.alarm()
             && self.send(&Message::Emergency(Name::Controller, alarm), bus)
         {
             self.controller.take_alarm();

@@ -32,8 +32,8 @@ impl Controller {
     }
 
     /// The first fault not reported to the peers yet.
-    pub fn alarm(&self) -> Option<Emergency> {
-        let [first, ..] = self.alarms;
+    pub fn alarm(&self) -> &Option<Emergency> {
+        let [first, ..] = &self.alarms;
         first
     }
 

@@ -26,11 +26,11 @@ const TURNING: f32 = 100.0;
 /// Share of its greatest speed below which an axis hardly moves. It passes that within milliseconds when it turns back.
 const SLOW: f32 = 0.1;
 
-/// Samples of which one has a look at axes that stand.
-const STANCE_SAMPLES: u32 = 10;
-
-/// Samples of which one accounts for heat and burden, and the instructions of a Cortex-M4F that it takes for that.
-const ACCOUNT_SAMPLES: u32 = 10;
+/// What need not be done in every sample takes turns, in so many: in the first, planning pauses for a look at what chatters and at the peers, and
+/// for reports, half the period of the state at 1 kHz; in the second, axes that stand are looked at, and in the middle heat and burden are accounted
+/// for. Counted in samples and not in time, so that the same feedback gives the same torques.
+pub const TURNS: u32 = 10;
+/// Instructions of a Cortex-M4F that heat and burden take.
 const ACCOUNT: u16 = 300;
 
 /// A torque that swings from limit to limit, %, as [`Chatter`](crate::control::chatter::Chatter) counts it.
@@ -108,10 +108,11 @@ impl Controller {
     #[inline(never)]
     fn strains(&self, axis: Axis, readings: &Readings) -> bool {
         let excess = axis.of(&self.excess);
-        let side = excess.signum();
-        let pull = axis.of(&readings.torque) * side;
-        let told = axis.of(&self.chatter.last()) * side;
-        excess != 0.0 && readings.is_still(axis) && pull >= PULLS * told
+        if excess == 0.0 || !readings.is_still(axis) {
+            return false;
+        }
+        let lacks = axis.of(&readings.torque) - PULLS * axis.of(&self.chatter.last());
+        lacks * excess.signum() >= 0.0
     }
 
     /// Looks for chatter, which need not be done in every sample.
@@ -153,13 +154,13 @@ impl Controller {
     }
 
     /// Plans, or watches axes that stand where there is nothing to plan: in one of ten samples; in manual operation, where a moment counts, in each,
-    /// and while the arm moves in every other one rather than planning. `samples` numbers them. Returns whether there was anything to plan.
-    pub fn plan_or_watch(&mut self, readings: &Readings, samples: u32) -> bool {
+    /// and while the arm moves in every other one rather than planning. `turn` is that of the sample. Returns whether there was anything to plan.
+    pub fn plan_or_watch(&mut self, readings: &Readings, turn: u32) -> bool {
         let is_manual = self.operation == Operation::Manual;
-        let is_turn = samples % if is_manual { 2 } else { STANCE_SAMPLES } == 1;
+        let is_turn = if is_manual { turn % 2 == 1 } else { turn == 1 };
         let is_first = is_manual && is_turn && self.state == State::Moving;
-        let spent = if samples % ACCOUNT_SAMPLES == ACCOUNT_SAMPLES / 2 {
-            self.account(ACCOUNT_SAMPLES);
+        let spent = if turn == TURNS / 2 {
+            self.account(TURNS);
             ACCOUNT
         } else {
             0

@@ -130,9 +130,10 @@ impl Controller {
         }
         // The reference of the last sample: at most one sample of motion older than `q`.
         let moved = self.setpoint.reference.qd * self.period;
-        let last_qd = self.last_qd();
-        let errors = [&(error + moved), &self.error, &last_qd];
-        if let Some(fault) = self.monitor.check(readings, q, qd, errors)
+        let (drive, last) = (&self.body.drive, &self.last_velocity);
+        let errors = [&(error + moved), &self.error];
+        let last_qd = || super::last_qd(drive, last);
+        if let Some(fault) = self.monitor.check(readings, q, qd, errors, last_qd)
             && !(fault.cause == Cause::SoftLimit && self.is_freed(q))
         {
             self.fail(fault);
