@@ -294,6 +294,9 @@ impl Observer for Judge {
             {
                 self.reports.take(time, cause);
             }
+            Message::State(state) if state.cause != Cause::None && self.faults.pile_up() => {
+                self.reports.repeat(time, state.cause);
+            }
             Message::Heartbeat(node, _) => self.faults.hear(node),
             Message::Feedback(feedback) => {
                 if self.reports.latched().is_none() {

@@ -30,6 +30,11 @@ impl Reports {
     /// Takes a report.
     pub(super) fn take(&mut self, time: Instant, cause: Cause) {
         self.escalated |= self.latched.is_some();
+        self.repeat(time, cause);
+    }
+
+    /// Takes what State says of the first cause: where its own report was lost, that tells it.
+    pub(super) fn repeat(&mut self, time: Instant, cause: Cause) {
         self.at_rest |= self.latched.is_none() && self.is_off;
         self.latched.get_or_insert((time, cause));
     }

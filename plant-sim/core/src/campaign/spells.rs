@@ -228,6 +228,20 @@ impl Spells {
         self.all.iter().map(of).max().unwrap_or(Reading::Right)
     }
 
+    /// Whether so many frames may wait for the bus that a report finds no room among them, and State alone tells its cause.
+    pub(super) fn pile_up(&self) -> bool {
+        self.any(|what| {
+            matches!(
+                what,
+                What::Attempts(..)
+                    | What::Misreads(..)
+                    | What::Babbling(_)
+                    | What::Wires(_)
+                    | What::Slow(_)
+            )
+        })
+    }
+
     /// Whether the number of a sample may not tell its time.
     pub(super) fn lose_count(&self) -> bool {
         self.any(loses_count)
