@@ -196,16 +196,6 @@ impl BuiltinBus {
         self.nodes[node.0].counters
     }
 
-    /// Mailboxes of `node` that are free.
-    ///
-    /// # Panics
-    /// With a node of another bus.
-    #[must_use]
-    pub fn room(&self, node: NodeId) -> usize {
-        let node = &self.nodes[node.0];
-        node.capacity - node.mailboxes.len()
-    }
-
     /// Puts a frame into a mailbox of `node` at `now`.
     ///
     /// `now` must not be earlier than the last delivery taken, and deliveries up to `now` must have been taken, since

@@ -4,7 +4,6 @@ use firmware::cabinet::rejoin::Rejoin;
 use firmware::cabinet::sample_clock::SampleClock;
 use firmware::control::controller::Config;
 use firmware::node::Node;
-use protocol::bus::TransmitError;
 use protocol::frame::CanFrame;
 use protocol::messages::ResetReason;
 use protocol::table;
@@ -106,18 +105,6 @@ impl InProcess {
     /// replaced by a new one.
     pub fn call(&mut self, now: Instant, received: Option<&CanFrame>, sent: &mut Vec<CanFrame>) {
         // Never full: the caller takes everything at once.
-        self.call_with(now, received, usize::MAX, sent);
-    }
-
-    /// The same, with `room` for so many frames; returns how many found none.
-    fn call_with(
-        &mut self,
-        now: Instant,
-        received: Option<&CanFrame>,
-        room: usize,
-        sent: &mut Vec<CanFrame>,
-    ) -> u64 {
-        let mut refused = 0;
         let answered = &mut self.answered;
         let mut send = |frame: &CanFrame| {
             // A command begins with the number of its sample, and no own one needs to be checked.
@@ -125,10 +112,6 @@ impl InProcess {
                 && let Some(sample) = frame.data().first_chunk()
             {
                 *answered = Some(u32::from_le_bytes(*sample));
-            }
-            if sent.len() >= room {
-                refused += 1;
-                return Err(TransmitError::QueueFull);
             }
             sent.push(*frame);
             Ok(())
@@ -151,7 +134,6 @@ impl InProcess {
         if self.node.reset_asked() {
             self.restart(ResetReason::Software);
         }
-        refused
     }
 }
 
@@ -168,7 +150,7 @@ impl Peer for InProcess {
         out: &mut Outbox,
     ) -> Result<(), PeerError> {
         let mut sent = std::mem::take(&mut self.sent);
-        world.refused += self.call_with(now, received, world.room, &mut sent);
+        self.call(now, received, &mut sent);
         out.extend(sent.drain(..).map(|frame| (now + COMPUTE, frame)));
         self.sent = sent;
         world.mind = self.mind();

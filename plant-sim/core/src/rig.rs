@@ -121,8 +121,6 @@ impl<'p> Rig<'p> {
                 sample: None,
                 clock: Clock::default(),
                 cell_events: Vec::new(),
-                room: usize::MAX,
-                refused: 0,
                 outcome: None,
             },
             outside: bus.attach_listener(MAILBOXES),
@@ -350,10 +348,7 @@ impl<'p> Rig<'p> {
         observer: &mut O,
     ) -> Result<(), PeerError> {
         let Seat { peer, node } = &mut self.seats[seat];
-        let on_the_way = self.pending.iter().filter(|(_, other, _)| other == node);
-        self.world.room = self.bus.room(*node).saturating_sub(on_the_way.count());
         peer.poll(now, received, &mut self.world, &mut self.out)?;
-        self.dropped += std::mem::take(&mut self.world.refused);
         debug_assert!(received.is_some() || peer.wake().is_none_or(|wake| wake > now));
         for (time, frame) in self.out.drain(..) {
             let place = self.pending.partition_point(|(other, ..)| *other <= time);

@@ -26,10 +26,6 @@ pub struct World {
     pub clock: Clock,
     /// Events in the cell during this call.
     pub cell_events: Vec<CellEvent>,
-    /// Mailboxes that are free for the peer that is called.
-    pub room: usize,
-    /// Frames for which it has found none during this call.
-    pub refused: u64,
     /// Outcome of the operator's scenario, once it has ended.
     pub outcome: Option<Result<(), OperatorError>>,
 }

@@ -56,8 +56,6 @@ impl Bench {
                 sample: None,
                 clock: Clock::default(),
                 cell_events: Vec::new(),
-                room: usize::MAX,
-                refused: 0,
                 outcome: None,
             },
             drives: Drives::new(&model, PERIOD),

@@ -73,8 +73,6 @@ fn survivors(fault: &str, count: u32, seed: u64) -> Vec<u32> {
         sample: None,
         clock: Clock::default(),
         cell_events: Vec::new(),
-        room: usize::MAX,
-        refused: 0,
         outcome: None,
     };
     let mut out = Outbox::new();

@@ -11,8 +11,6 @@
 #[path = "common/record.rs"]
 mod record;
 
-use protocol::codec::decode;
-use protocol::messages::{Cause, Message, Node};
 use record::run_of;
 use sim::scenario::Scenario;
 use sim::summary::{Fault, Summary};
@@ -88,21 +86,4 @@ fn a_shoulder_that_turns_back_slowly_is_not_stuck() {
             }
         }
     }
-}
-
-/// Frames of feedback that had to wait are answered all at once, and leave no mailbox free for the emergency: it comes once there is one.
-#[test]
-fn an_emergency_waits_for_a_mailbox() {
-    let mut scenario = Scenario::built_in("gate").unwrap();
-    scenario.cycles = 1;
-    let (summary, record) = run_of(scenario, &["feedback:form-error@21ms..81ms"], 0);
-    assert_eq!(summary.faults[0].cause, Cause::FeedbackLost.name());
-    let messages = record.frames.iter().map(|(_, frame)| decode(frame));
-    let told = messages.filter(|received| {
-        matches!(
-            received.as_ref().map(|received| &received.message),
-            Ok(Message::Emergency(Node::Controller, emergency)) if emergency.cause == Cause::FeedbackLost
-        )
-    });
-    assert_eq!(told.count(), 1);
 }
