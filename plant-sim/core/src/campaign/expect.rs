@@ -59,7 +59,7 @@ const OLD: Duration = Duration::from_millis(2);
 const PASSIVE: Duration = Duration::from_millis(2);
 
 /// Noise of a sound encoder, rad and m: two of its counts at the shoulder.
-const SOUND_NOISE: f64 = 1.2e-6;
+pub(super) const SOUND_NOISE: f64 = 1.2e-6;
 
 /// What a crystal may be off by.
 const SOUND_CLOCK: f64 = 1e-4;

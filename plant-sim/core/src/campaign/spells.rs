@@ -6,7 +6,7 @@ use protocol::time::{Duration, Instant, Period};
 use super::bounds::Reading;
 use super::causes;
 use super::due::{Hearts, Reach, Stage, due, reach};
-use super::expect::{Expected, expected, lateness, loses_count};
+use super::expect::{Expected, SOUND_NOISE, expected, lateness, loses_count};
 use super::verdict::Requirement;
 use crate::faults::{Fault, FrameFault, What};
 use crate::model::Payload;
@@ -222,7 +222,7 @@ impl Spells {
         let of = |spell: &Spell| match spell.what {
             What::Encoder(_, EncoderDefect::Reversed) => Reading::Reversed,
             What::Encoder(_, EncoderDefect::Stuck | EncoderDefect::Slow(_)) => Reading::Wrong,
-            What::Encoder(_, EncoderDefect::Noise(_)) => Reading::Noisy,
+            What::Encoder(_, EncoderDefect::Noise(most)) if most > SOUND_NOISE => Reading::Noisy,
             _ => Reading::Right,
         };
         self.all.iter().map(of).max().unwrap_or(Reading::Right)
