@@ -364,7 +364,7 @@ impl Controller {
     }
 }
 
-/// Joint velocities of a motor velocity.
+/// Joint velocities at these motor velocities.
 // Out of line, for the size of two copies that are rarely reached.
 #[inline(never)]
 fn last_qd(drive: &Drive, velocity: &Vector4<f32>) -> Vector4<f32> {

@@ -47,7 +47,8 @@ impl Stance {
 
     /// Judges the efforts that the model does not explain (N m, lift N), with the dry friction of each axis and what the loop makes of a
     /// count. Looks are `close` where an axis that came to rest between two of them hardly slowed down before the first: an effort that has
-    /// grown since then is that of the motion which an encoder misses that got stuck. Returns the first axis whose effort has grown by more than these hold, with that growth and its bound.
+    /// grown since then is that of the motion which an encoder misses that got stuck. Returns the first axis whose effort has grown by more than
+    /// these hold, with that growth and its bound.
     pub fn look(
         &mut self,
         readings: &Readings,
