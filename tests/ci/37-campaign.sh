@@ -34,8 +34,8 @@ done
 plant-sim campaign merge parts | cmp - whole.jsonl
 
 echo "- killed a hundred times, at any moment"
-# Cases of a millisecond, so that a batch of them is soon on disk: on two cores 61 batches, of which fewer than half are done after a
-# hundred kills, many of which come before the end of a batch.
+# Cases of a millisecond, so that a batch of them is soon on disk: on two cores 61 batches. A run lasts for up to five of them, its reading of the
+# plan included: many kills come before the end of a batch, and all parts are done before a hundred of them, and begun anew.
 cat >short.toml <<'END'
 faults = ["encoder:elbow:jump=0.2", "encoder:lift:noise=0.05"]
 lasts_ms = [0]
@@ -54,7 +54,7 @@ mkdir killed
 saved() { find killed -type f -exec cat {} + | wc -l; }
 part=0 kills=0 progress=0
 while [ $kills -lt 100 ]; do
-    if [ $part = 4 ]; then # a machine that is faster now than when it was measured
+    if [ $part = 4 ]; then
         plant-sim campaign merge killed | cmp - undisturbed.jsonl
         rm -r killed
         mkdir killed
@@ -62,7 +62,7 @@ while [ $kills -lt 100 ]; do
     fi
     before=$(saved)
     plant-sim campaign run short.jsonl --jobs 2 --shard $part/4 --out killed --resume >/dev/null 2>"$work/killed.err" & run=$!
-    sleep "$((RANDOM * 2 * batch / 32768))e-6"
+    sleep "$((RANDOM * 5 * batch / 32768))e-6"
     kill -KILL $run 2>/dev/null || true
     status=0
     wait $run 2>/dev/null || status=$?
